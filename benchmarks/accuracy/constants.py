@@ -121,14 +121,15 @@ class Replicates:
         return Result(text, digest, steps, 0, np.array([row["d_c_last"]]), float(row["error"]))
 
 
-def clear_caches() -> None:
-    """Forget what functions of the ROOMS remember, which may follow from a constant."""
+def caches() -> dict[str, list]:
+    """Return {module: functions of the ROOMS that remember what may follow from a constant}."""
     rooms = tuple(f"{PACKAGE}.{room.removesuffix('.py').replace('/', '.')}" for room in ROOMS)
+    found = {}
     for name, module in list(sys.modules.items()):
         if name.startswith(rooms) and name != f"{PACKAGE}.hooks":
-            for value in list(vars(module).values()):
-                if callable(getattr(value, "cache_clear", None)):
-                    value.cache_clear()
+            known = [each for each in vars(module).values() if hasattr(each, "cache_clear")]
+            found |= {name: known} if known else {}
+    return found
 
 
 class Runs:
@@ -138,9 +139,10 @@ class Runs:
         self.scenes, self.count = scenes, scenes + replicates
         self.replicates = Replicates(folder) if replicates else None
 
-    def run(self, number: int) -> Result:
-        """Return the Result of a run."""
-        clear_caches()
+    def run(self, number: int, afresh: bool = False) -> Result:
+        """Return the Result of a run; ``afresh``: nothing is remembered of others."""
+        for function in [each for known in caches().values() for each in known] if afresh else ():
+            function.cache_clear()
         if number < self.scenes:
             return run_scene(number)
         return self.replicates.run(number - self.scenes)
@@ -164,21 +166,32 @@ class Trials:
         self.unchanged: list[Result] = []
         self.spent: list[float] = []
         self.readers: list[set[int]] = [set() for _ in tuned.VALUES]
+        self.remembered: set[int] = set()
 
     def begin(self) -> None:
-        """Run everything unchanged, once to compile and once to note what is read."""
+        """Run everything unchanged: to compile, and to note what is read. What a run reads afresh
+        alone is remembered by functions: where it is changed, runs have to forget it."""
         for number in range(self.runs.count):
             self.runs.run(number)
         for number in range(self.runs.count):
-            self.table.flags[:] = [0.0] * self.table.COUNT
+            all_read, _ = self.read_by(number, True)
             began = time.perf_counter()
-            self.unchanged.append(self.runs.run(number))
+            read, result = self.read_by(number, False)
             self.spent.append(time.perf_counter() - began)
-            for index, read in enumerate(self.table.flags):
-                if read:
-                    self.readers[index].add(number)
+            self.unchanged.append(result)
+            self.remembered |= all_read - read
+            for index in all_read | read:
+                self.readers[index].add(number)
 
-    def child(self, changes: dict[int, float], numbers: list[int]) -> tuple[int, int]:
+    def read_by(self, number: int, afresh: bool) -> tuple[set[int], Result]:
+        """Return the indices of the constants that a run reads, and its Result."""
+        self.table.flags[:] = [0.0] * self.table.COUNT
+        result = self.runs.run(number, afresh)
+        return {index for index, read in enumerate(self.table.flags) if read}, result
+
+    def child(
+        self, changes: dict[int, float], numbers: list[int], afresh: bool
+    ) -> tuple[int, int]:  # fmt: skip
         """Start a child with changed values that sends the result of each run; return its process
         id and the end of its pipe."""
         end, start = os.pipe()
@@ -191,7 +204,7 @@ class Trials:
                 self.table.values[index] = value
             for number in numbers:
                 try:
-                    found: object = self.runs.run(number)
+                    found: object = self.runs.run(number, afresh)
                 except Exception as error:
                     found = f"{type(error).__name__}: {error}"
                 data = pickle.dumps(found)
@@ -199,13 +212,15 @@ class Trials:
                 pipe.flush()
         os._exit(0)
 
-    def results(self, changes: dict[int, float], numbers: list[int]) -> dict[int, object]:
+    def results(
+        self, changes: dict[int, float], numbers: list[int], afresh: bool
+    ) -> dict[int, object]:  # fmt: skip
         """Return {number: Result, or text on what went wrong} of runs with changed values."""
         found: dict[int, object] = {}
         failed = 0
         while len(found) < len(numbers) and failed < FAILED_RUNS:
             left = [each for each in numbers if each not in found]
-            process, pipe = self.child(changes, left)
+            process, pipe = self.child(changes, left, afresh)
             try:
                 for number in left:
                     allowed = max(self.limit, SLOWER * self.spent[number])
@@ -221,12 +236,12 @@ class Trials:
                 os.waitpid(process, 0)
         return found
 
-    def effect(self, changes: dict[int, float]) -> dict:
+    def effect(self, changes: dict[int, float], afresh: bool) -> dict:
         """Return what changed values do: ratios of steps and evaluations over all runs, and the
         runs whose outcomes, positions or bits differ, or that fail."""
         numbers = sorted(set().union(*(self.readers[index] for index in changes)))
         began = time.perf_counter()
-        found = self.results(changes, numbers)
+        found = self.results(changes, numbers, afresh)
         results = {n: r for n, r in found.items() if isinstance(r, Result)}
         ratios = {}
         for name in ("steps", "evaluations"):
@@ -291,8 +306,8 @@ def work(folder: Path, scenes: int, replicates: int, limit: float, wanted: list[
     began = time.perf_counter()
     trials.begin()
     compare(folder, trials)
-    print(f"{trials.runs.count} runs twice in {time.perf_counter() - began:.0f} s, one of them "
-          f"{sum(trials.spent):.1f} s", file=sys.stderr, flush=True)  # fmt: skip
+    print(f"{trials.runs.count} runs in {sum(trials.spent):.1f} s, compiled and noted in "
+          f"{time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)  # fmt: skip
     more, file = dependents(tuned), folder / "results.jsonl"
     done = {each["key"] for each in stored(folder)}
     for index, constant in enumerate(tuned):
@@ -300,13 +315,14 @@ def work(folder: Path, scenes: int, replicates: int, limit: float, wanted: list[
             continue
         value = trials.table.VALUES[index]
         value = int(value) if type(constant.value) is int else value
+        afresh = index in trials.remembered or constant.module in caches()
         found = {"key": constant.key, "value": value, "documented": constant.documented,
                  "readers": len(trials.readers[index])}  # fmt: skip
         for name, factor in FACTORS.items():
             other = changed_value(value, factor)
             if other != value:
                 changes = changes_of(index, other, tuned, more)
-                found[name] = {"value": other} | trials.effect(changes)
+                found[name] = {"value": other} | trials.effect(changes, afresh)
         with file.open("a", encoding="utf-8") as out:
             out.write(json.dumps(found) + "\n")
         write_table(folder, constants)

@@ -234,7 +234,7 @@ def level(width):
 def impact(draw, shapes, law, forces=(), integrator=None, fluid=None):
     """Let one body fly into another, and both go on for some lengths of a contact."""
     bodies, flight = thrown(draw, shapes, between(draw, 1e-3, 0.3))
-    until = flight + draw.uniform(1.0, 12.0) * oscillation(law, bodies)
+    until = flight + between(draw, 1.0, 100.0) * oscillation(law, bodies)
     method = integrator or implicit(draw)
     return System(bodies, [*forces, law], method, fluid or WATER), until
 
@@ -288,13 +288,13 @@ def along_outlines(draw):
     shapes = [polygon(draw, most=8), polygon(draw, most=8)]
     attraction = VanDerWaals(between(draw, 1e-21, 1e-18), 1e-9, law="outline")
     repulsion = DoubleLayer(
-        between(draw, 5e-3, 5e-2), between(draw, 2e-9, 5e-8), law="outline",
+        between(draw, 5e-3, 5e-2), between(draw, 4e-8, 1e-7), law="outline",
         boundary=draw.pick("superposition", "potential"),
     )  # fmt: skip
     forces = [Gravity(), StokesDrag(), attraction, repulsion]
-    bodies = stack(draw, [Body(shapes[0], density=DENSITY)], shapes[1:], gap=1e-7, lean=0.6)
+    bodies = stack(draw, [Body(shapes[0], density=DENSITY)], shapes[1:], gap=3e-8, lean=0.6)
     bodies[0] = attrs.evolve(bodies[0], fixed=True)
-    until = settling_time(shapes[1].equivalent_radius, between(draw, 1e-8, 1e-6))
+    until = settling_time(shapes[1].equivalent_radius, between(draw, 1e-9, 3e-8))
     return System(bodies, [*forces, contact(draw)], implicit(draw), WATER), until
 
 
@@ -333,12 +333,12 @@ def kicks(draw):
 def pair_hydrodynamics(draw):
     """Let two spheres settle that resist each other through the water."""
     shapes = [Sphere(draw.pick(2.5e-6, 5e-6)), Sphere(5e-6)]
-    bodies = stack(draw, [Body(shapes[0], density=DENSITY)], shapes[1:], gap=5e-6, lean=0.8)
+    bodies = stack(draw, [Body(shapes[0], density=DENSITY)], shapes[1:], gap=1e-6, lean=0.8)
     forces = [
         Gravity(), StokesDrag(), PairResistance(h_min=between(draw, 1e-9, 1e-7)),
         VanDerWaals(between(draw, 1e-21, 1e-19), gap="surface"),
     ]  # fmt: skip
-    until = settling_time(5e-6, between(draw, 1e-6, 3e-5))
+    until = settling_time(5e-6, between(draw, 1e-6, 1e-4))
     return System(bodies, [*forces, contact(draw)], implicit(draw), WATER), until
 
 
