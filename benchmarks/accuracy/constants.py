@@ -311,7 +311,7 @@ def work(folder: Path, scenes: int, replicates: int, limit: float, wanted: list[
     more, file = dependents(tuned), folder / "results.jsonl"
     done = {each["key"] for each in stored(folder)}
     for index, constant in enumerate(tuned):
-        if constant.key in done or (wanted and not is_wanted(constant, wanted)):
+        if constant.key in done or not is_wanted(constant, wanted):
             continue
         value = trials.table.VALUES[index]
         value = int(value) if type(constant.value) is int else value
@@ -351,8 +351,10 @@ def stored(folder: Path) -> list[dict]:
 
 
 def is_wanted(constant, names: list[str]) -> bool:
-    """Return True if a constant has one of the names, with or without its module."""
-    return constant.name in names or constant.key in names
+    """Return True if a constant is tuned and has one of the names, with or without its module;
+    without names, any that is tuned."""
+    named = not names or constant.name in names or constant.key in names
+    return named and not constant.left_out
 
 
 def words_of(effect: dict | None) -> list[str]:
@@ -381,10 +383,25 @@ def write_table(folder: Path, constants: list) -> None:
         if found is not None:
             cells = [each for name in FACTORS for each in words_of(found.get(name))]
             table.rows.append([each.key, each.text, known, str(found["readers"]), *cells])
-    left = [f"{each.key} = {each.text[:60]}: {each.left_out}" for each in constants
-            if each.left_out]  # fmt: skip
-    text = "\n".join([table.aligned(), "", "Left out:", *left])
+    lists = {
+        "Changes nothing, though runs read it": [
+            f"{key} ({found['readers']} runs)" for key, found in results.items()
+            if found["readers"] and not has_effect(found)
+        ],
+        "Read by no run": [key for key, found in results.items() if not found["readers"]],
+        "Left out": [f"{each.key} = {each.text[:60]}: {each.left_out}" for each in constants
+                     if each.left_out],
+    }  # fmt: skip
+    text = table.aligned()
+    for title, lines in lists.items():
+        text += "\n".join([f"\n\n{title}: {len(lines)}", *lines])
     (folder / "table.txt").write_text(text + "\n", "utf-8")
+
+
+def has_effect(found: dict) -> bool:
+    """Return True if a change has another number of steps, another outcome, or a run that fails."""
+    effects = [found[name] for name in FACTORS if name in found]
+    return any(each["steps"] != 1.0 or each["outcomes"] or each["wrong"] for each in effects)
 
 
 def print_list(constants: list) -> None:
@@ -435,6 +452,11 @@ def main() -> None:
         print_list(constants)
         return
     folder.mkdir(parents=True, exist_ok=True)
+    wanted = [each for each in constants if is_wanted(each, options.constants)]
+    if {each.key for each in wanted} <= {each["key"] for each in stored(folder)}:
+        write_table(folder, constants)
+        print((folder / "table.txt").read_text("utf-8"))
+        return
     make_copy(folder / "copy", [each for each in constants if not each.left_out])
     (folder / "constants.pickle").write_bytes(pickle.dumps(constants))
     run_of("--part", "package", *shared)
