@@ -213,14 +213,22 @@ def stack(draw, below, shapes, gap=1e-7, lean=0.2):
     """Return bodies one above the other on the last of some bodies."""
     bodies = list(below)
     for each in shapes:
-        last = bodies[-1]
-        upwards = 0.5 * math.pi + draw.uniform(-lean, lean)
-        at = *last.position, last.angle
-        place = place_at_gap(
-            last.shape, at, each, draw.angle(), upwards, between(draw, 0.1, 1.0) * gap
-        )  # fmt: skip
+        *others, last = bodies
+        place = None
+        # The outline of the last body alone is sure to be free.
+        while place is None or any(gap_to(one, each, place) <= 0.0 for one in others):
+            upwards = 0.5 * math.pi + draw.uniform(-lean, lean)
+            at = *last.position, last.angle
+            place = place_at_gap(
+                last.shape, at, each, draw.angle(), upwards, between(draw, 0.1, 1.0) * gap
+            )  # fmt: skip
         bodies.append(placed(Body(each, density=DENSITY), place))
     return bodies
+
+
+def gap_to(body, shape, place):
+    """Return the gap [m] between a body and a shape at a place (x, y, θ)."""
+    return outline_gap(body.shape, (*body.position, body.angle), shape, place)
 
 
 def level(width):
