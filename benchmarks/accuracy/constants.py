@@ -26,14 +26,16 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import attrs
 import numpy as np
 
-from benchmarks.accuracy.random_scenes import scene_of
+from benchmarks.accuracy.random_scenes import RandomScene, scene_of
 from benchmarks.accuracy.tunable import PACKAGE, ROOMS, all_constants, dependents, make_copy
 from benchmarks.reporting import ROOT, Table, begin
+from flocsim.compiler import composer
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.kind import study_of
 
@@ -91,9 +93,9 @@ def digest_of(*values: object) -> str:
     return hashlib.blake2b(b"|".join(parts), digest_size=8).hexdigest()
 
 
-def run_scene(number: int) -> Result:
+def result_of(scene: RandomScene) -> Result:
     """Return the Result of a random scene."""
-    end = scene_of(number).run()
+    end = scene.run()
     digest = digest_of(end.outcome, end.steps, end.evaluations, end.position, end.error)
     # The turning of a body counts as its outline moves, of some 5 µm.
     position = (end.position * np.array([1.0, 1.0, 5e-6])).ravel()
@@ -132,19 +134,51 @@ def caches() -> dict[str, list]:
     return found
 
 
+def compose_once() -> None:
+    """Let all modules link and hash each function once, which takes longer than a short run."""
+    engines: dict = {}
+    laws: dict = {}
+
+    def compose(entry, fillings, **options):
+        key = entry, frozenset(fillings.items()), *options.items()
+        if key not in engines:
+            engines[key] = composer.compose(entry, fillings, **options)
+        return engines[key]
+
+    def compile_law(law, told, *more):
+        if (law, told) not in laws:
+            laws[law, told] = composer.compile_law(law, told, *more)
+        return laws[law, told]
+
+    for name, module in list(sys.modules.items()):
+        if name.startswith(PACKAGE) and module is not composer:
+            for made in (compose, compile_law):
+                if vars(module).get(made.__name__) is getattr(composer, made.__name__):
+                    setattr(module, made.__name__, made)
+
+
 class Runs:
     """All runs by their numbers: random scenes, then replicates."""
 
     def __init__(self, folder: Path, scenes: int, replicates: int) -> None:
+        compose_once()
         self.scenes, self.count = scenes, scenes + replicates
+        self.made: dict[int, RandomScene] = {}
         self.replicates = Replicates(folder) if replicates else None
 
-    def run(self, number: int, afresh: bool = False) -> Result:
-        """Return the Result of a run; ``afresh``: nothing is remembered of others."""
-        for function in [each for known in caches().values() for each in known] if afresh else ():
-            function.cache_clear()
+    def prepare(self, number: int, afresh: bool) -> None:
+        """Make the bodies and forces of a random scene, if they are not there; ``afresh``: in any
+        case, with nothing remembered of other runs."""
+        if afresh:
+            for function in [each for known in caches().values() for each in known]:
+                function.cache_clear()
+        if number < self.scenes and (afresh or number not in self.made):
+            self.made[number] = scene_of(number)
+
+    def run(self, number: int) -> Result:
+        """Return the Result of a run that is prepared."""
         if number < self.scenes:
-            return run_scene(number)
+            return result_of(self.made[number])
         return self.replicates.run(number - self.scenes)
 
     def name(self, number: int) -> str:
@@ -169,25 +203,27 @@ class Trials:
         self.remembered: set[int] = set()
 
     def begin(self) -> None:
-        """Run everything unchanged: to compile, and to note what is read. What a run reads afresh
-        alone is remembered by functions: where it is changed, runs have to forget it."""
+        """Run everything unchanged: to compile, and to note what is read. What is read only while
+        a run is prepared, or by its first run, is remembered in results: where it is changed, runs
+        are prepared afresh."""
         for number in range(self.runs.count):
+            self.runs.prepare(number, False)
             self.runs.run(number)
         for number in range(self.runs.count):
-            all_read, _ = self.read_by(number, True)
+            prepared = self.read_by(lambda n=number: self.runs.prepare(n, True))
+            first = self.read_by(lambda n=number: self.runs.run(n))
             began = time.perf_counter()
-            read, result = self.read_by(number, False)
+            again = self.read_by(lambda n=number: self.unchanged.append(self.runs.run(n)))
             self.spent.append(time.perf_counter() - began)
-            self.unchanged.append(result)
-            self.remembered |= all_read - read
-            for index in all_read | read:
+            self.remembered |= prepared | (first - again)
+            for index in prepared | first | again:
                 self.readers[index].add(number)
 
-    def read_by(self, number: int, afresh: bool) -> tuple[set[int], Result]:
-        """Return the indices of the constants that a run reads, and its Result."""
+    def read_by(self, function: Callable[[], object]) -> set[int]:
+        """Return the indices of the constants that a function reads."""
         self.table.flags[:] = [0.0] * self.table.COUNT
-        result = self.runs.run(number, afresh)
-        return {index for index, read in enumerate(self.table.flags) if read}, result
+        function()
+        return {index for index, read in enumerate(self.table.flags) if read}
 
     def child(
         self, changes: dict[int, float], numbers: list[int], afresh: bool
@@ -204,7 +240,8 @@ class Trials:
                 self.table.values[index] = value
             for number in numbers:
                 try:
-                    found: object = self.runs.run(number, afresh)
+                    self.runs.prepare(number, afresh)
+                    found: object = self.runs.run(number)
                 except Exception as error:
                     found = f"{type(error).__name__}: {error}"
                 data = pickle.dumps(found)
@@ -420,7 +457,10 @@ def print_list(constants: list) -> None:
 def run_package(folder: Path, scenes: int, replicates: int) -> None:
     """Store the digests of all runs of the package itself."""
     runs = Runs(folder, scenes, replicates)
-    digests = [runs.run(number).digest for number in range(runs.count)]
+    digests = []
+    for number in range(runs.count):
+        runs.prepare(number, True)
+        digests.append(runs.run(number).digest)
     (folder / "package.json").write_text(json.dumps(digests), "utf-8")
 
 
