@@ -18,6 +18,7 @@ import contextlib
 import functools
 import hashlib
 import json
+import math
 import os
 import pickle
 import select
@@ -70,6 +71,11 @@ SLOWER = 50.0
 
 BEYOND = 3.0
 """A position has moved if it differs by so many times the sum of both stated errors."""
+
+
+LITTLE = 0.01
+"""Change of the number of steps, by halving and by doubling, below which a constant matters
+little."""
 
 
 @attrs.frozen
@@ -279,18 +285,23 @@ class Trials:
         return found
 
     def effect(self, changes: dict[int, float], afresh: bool) -> dict:
-        """Return what changed values do: ratios of steps and evaluations over all runs, and the
-        runs whose outcomes, positions or bits differ, or that fail."""
+        """Return what changed values do: ratios of steps and evaluations over all runs, that of
+        steps over replicates, the geometric mean of each run's ratio; and the runs whose outcomes,
+        positions or bits differ, or that fail."""
         numbers = sorted(set().union(*(self.readers[index] for index in changes)))
         began = time.perf_counter()
         found = self.results(changes, numbers, afresh)
         results = {n: r for n, r in found.items() if isinstance(r, Result)}
-        ratios = {}
-        for name in ("steps", "evaluations"):
-            total = sum(getattr(each, name) for each in self.unchanged)
-            gained = sum(getattr(r, name) - getattr(self.unchanged[n], name)
-                         for n, r in results.items())  # fmt: skip
-            ratios[name] = 1.0 + gained / total if total else 1.0
+        steps, before = self.sums(results, "steps", range(self.runs.count))
+        ours = self.sums(results, "steps", range(self.runs.scenes, self.runs.count))
+        forces = self.sums(results, "evaluations", range(self.runs.count))
+        logs = [math.log((r.steps + 1) / (self.unchanged[n].steps + 1)) for n, r in results.items()]
+        ratios = {
+            "steps": steps / before,
+            "steps of replicates": ours[0] / ours[1] if ours[1] else 1.0,
+            "mean": math.exp(sum(logs) / self.runs.count),
+            "evaluations": forces[0] / forces[1] if forces[1] else 1.0,
+        }
         differs = {n: r for n, r in results.items() if r.outcome != self.unchanged[n].outcome}
         return ratios | {
             "runs": len(found),
@@ -302,6 +313,13 @@ class Trials:
             "wrong": {self.runs.name(n): r for n, r in found.items() if isinstance(r, str)},
             "seconds": time.perf_counter() - began,
         }  # fmt: skip
+
+    def sums(self, results: dict[int, Result], name: str, numbers: range) -> tuple[int, int]:
+        """Return the sum of a number of each run, with the changed results and without."""
+        before = sum(getattr(self.unchanged[n], name) for n in numbers)
+        gained = sum(getattr(results[n], name) - getattr(self.unchanged[n], name)
+                     for n in numbers if n in results)  # fmt: skip
+        return before + gained, before
 
 
 def message(pipe: int, seconds: float) -> bytes | str:
@@ -402,14 +420,15 @@ def is_wanted(constant, names: list[str]) -> bool:
 def words_of(effect: dict | None) -> list[str]:
     """Return the columns of one change."""
     if effect is None:
-        return ["-", "-", "-"]
+        return ["-"] * 5
     wrong = Counter(each if each in ("hangs", "crashes") else "raises"
                     for each in effect["wrong"].values())  # fmt: skip
     more = "".join(f", {count} {name}" for name, count in wrong.items())
     if not effect["bits"] and not wrong:
-        return ["1", "0", "0"]
-    steps = f"{effect['steps']:.3f}"
-    return [steps, f"{len(effect['outcomes'])}{more}", str(len(effect["moved"]))]
+        return ["1", "1", "1", "0", "0"]
+    ratios = (effect.get(name) for name in ("steps", "steps of replicates", "mean"))
+    shown = ["?" if ratio is None else f"{ratio:.3f}" for ratio in ratios]
+    return [*shown, f"{len(effect['outcomes'])}{more}", str(len(effect["moved"]))]
 
 
 def write_table(folder: Path, constants: list) -> None:
@@ -417,7 +436,7 @@ def write_table(folder: Path, constants: list) -> None:
     results = {each["key"]: each for each in stored(folder)}
     columns = ["constant", "value", "documented", "runs that read it"]
     for name in FACTORS:
-        columns += [f"{name}: steps", "outcomes", "moved"]
+        columns += [f"{name}: steps", "of replicates", "mean", "outcomes", "moved"]
     table = Table("Effect of each constant", tuple(columns))
     for each in constants:
         found = results.get(each.key)
@@ -428,7 +447,11 @@ def write_table(folder: Path, constants: list) -> None:
     lists = {
         "Changes nothing, though runs read it": [
             f"{key} ({found['readers']} runs)" for key, found in results.items()
-            if found["readers"] and not has_effect(found)
+            if found["readers"] and changes_nothing(found)
+        ],
+        f"Changes no outcome, and steps by less than {LITTLE:.0%}": [
+            f"{key} ({found['readers']} runs)" for key, found in results.items()
+            if changes_little(found)
         ],
         "Read by no run": [key for key, found in results.items() if not found["readers"]],
         "Left out": [f"{each.key} = {each.text[:60]}: {each.left_out}" for each in constants
@@ -440,10 +463,25 @@ def write_table(folder: Path, constants: list) -> None:
     (folder / "table.txt").write_text(text + "\n", "utf-8")
 
 
-def has_effect(found: dict) -> bool:
-    """Return True if a change has another number of steps, another outcome, or a run that fails."""
-    effects = [found[name] for name in FACTORS if name in found]
-    return any(each["steps"] != 1.0 or each["outcomes"] or each["wrong"] for each in effects)
+def effects_of(found: dict) -> list[dict]:
+    """Return the effects of all changes of a constant."""
+    return [found[name] for name in FACTORS if name in found]
+
+
+def changes_nothing(found: dict) -> bool:
+    """Return True if no run differs by a bit."""
+    return not any(each["bits"] or each["wrong"] for each in effects_of(found))
+
+
+def changes_little(found: dict) -> bool:
+    """Return True if some bits differ, but no outcome or position, and steps by less than LITTLE
+    in all."""
+    ratios = ("steps", "steps of replicates", "mean")
+    return not changes_nothing(found) and not any(
+        each["outcomes"] or each["moved"] or each["wrong"]
+        or any(abs(each.get(name, 1.0) - 1.0) > LITTLE for name in ratios)
+        for each in effects_of(found)
+    )  # fmt: skip
 
 
 def print_list(constants: list) -> None:
