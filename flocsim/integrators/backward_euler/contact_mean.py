@@ -12,7 +12,7 @@ exactly one solution. The cut is the return mapping of plasticity.
 
 Without a friction limit a contact may open under T and close without it. It then ends just open,
 with the s that balances the two. That s would vanish within Δ₀, which may be arbitrarily small: so
-a contact that opens counts as closed at the start by at least FADE_FRACTION of the tolerance.
+a contact that opens counts as closed at the start by at least a hundredth of the tolerance.
 """
 
 import math
@@ -35,10 +35,6 @@ from flocsim.integrators.rhs.views import (
 from flocsim.state.contacts import CLOSED
 from flocsim.state.views import ContactView, moved_contact
 from flocsim.state.work import DAMPING, NEW, NOW, STIFFNESS, TRIAL
-
-FADE_FRACTION = 0.01
-"""Gap, over the tolerance, within which the tangential force of an opening contact falls to half;
-its overlap at the start is used where that is larger."""
 
 
 def takes_part(work, row):

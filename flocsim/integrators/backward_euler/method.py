@@ -6,8 +6,8 @@ while nothing moves. So, in a System or Swarm whose bodies touch:
 - After every PROBE steps that end at events, Implicit compares. If backward Euler would have
   needed AHEAD times fewer steps for that time than were tried, it hands over. With fewer bodies
   than FEWEST the factor is FAR_AHEAD, for a pair of a swarm that vibrates without end.
-- It takes back where nothing touches any more, where ENOUGH_TRIALS steps had fewer than
-  FEW_SWITCHES events each, and where bodies would rebound by more than the tolerance.
+- It takes back where nothing touches any more, where PROBE steps had fewer than FEW_SWITCHES
+  events each, and where bodies would rebound by more than the tolerance.
 
 The rule depends on counts of steps alone. Measured times would differ between machines.
 """
@@ -76,18 +76,13 @@ FEWEST = 3
 """Bodies, fixed ones included. Two have few contacts: a System of two leaves all of this out."""
 
 PROBE = 60
-"""Steps with located events between two comparisons."""
+"""Steps between two comparisons."""
 
 AHEAD, FAR_AHEAD = 4.0, 40.0
 """Factor by which backward Euler must need fewer steps; and the factor below FEWEST bodies."""
 
-ENOUGH_TRIALS, FEW_SWITCHES = 60, 0.25
-"""After this many steps with fewer events per step than the second number, located events cost no
-more."""
-
-MANY, LEAST_PROBE = 50, 10
-"""Number of bodies above which steps that end at events are tried in proportion less often, and for
-fewer steps, down to LEAST_PROBE. They never paid in a pile of 495, and took a tenth of the time."""
+FEW_SWITCHES = 0.25
+"""Events per step across them below which located events cost no more."""
 
 
 def largest_change(scene, work):
@@ -112,11 +107,6 @@ def would_pay(scene, work, clock, trials, passed):
     return ahead * steps <= trials
 
 
-def crowding(work):
-    """Return the number of bodies over MANY, at least 1."""
-    return max(1.0, work.poses.shape[0] / MANY)
-
-
 def keep_method(scene, work, clock, counts):
     """Never hand over: among two bodies steps that end at events are as good."""
 
@@ -130,7 +120,7 @@ def hand_over(scene, work, clock, counts):
     trials = tried - counts.trials_at_check
     # Across events: take back where there are few, or nothing touches.
     if clock.across == 1.0:
-        enough = trials >= ENOUGH_TRIALS * crowding(work)
+        enough = trials >= PROBE
         quiet = enough and clock.switches_since_check < FEW_SWITCHES * trials
         if quiet or least_listed_gap(work) >= 0.0:
             end_at_switches(scene, work, clock)
@@ -144,8 +134,7 @@ def hand_over(scene, work, clock, counts):
         if would_pay(scene, work, clock, trials, passed) and least_listed_gap(work) < 0.0:
             start_across(clock, passed)
     # Start the next comparison from here.
-    probe = max(LEAST_PROBE, int(PROBE / crowding(work)))
-    counts.next_check, counts.trials_at_check = counts.steps + probe, tried
+    counts.next_check, counts.trials_at_check = counts.steps + PROBE, tried
     clock.checked_at, clock.switches_since_check = clock.time, 0.0
     for body in range(work.place.shape[1]):
         for axis in range(3):

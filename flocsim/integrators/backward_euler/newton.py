@@ -18,7 +18,6 @@ from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import locate_acting, locate_contacts
 from flocsim.hooks import CONTACT_FORCE, has
 from flocsim.integrators.backward_euler.contact_mean import (
-    FADE_FRACTION,
     add_all_derivatives,
     add_mean_forces,
     flag_close,
@@ -37,7 +36,8 @@ from flocsim.state.contacts import CLOSED, OPEN
 from flocsim.state.work import CHANGE, NEW, NOW, START, TRIAL
 
 NEWTON_TOLERANCE = 0.01
-"""Error that Newton's method may leave, as a fraction of the tolerance."""
+"""Error that Newton's method may leave, as a fraction of the tolerance; and the least gap within
+which the tangential force of an opening contact falls to half."""
 
 MAX_ITERATIONS = 8
 """Iterations after which the active sets are taken to be unknown."""
@@ -49,7 +49,7 @@ def begin_step(work, clock):
     for row in range(work.tally.candidates):
         work.geometry[TRIAL, row] = work.geometry[NOW, row]
         work.candidates[row].contact_mode = OPEN
-        least = FADE_FRACTION * clock.tolerance
+        least = NEWTON_TOLERANCE * clock.tolerance
         work.interior[row].fade_length = max(-work.geometry[NOW, row].gap, least)
 
 

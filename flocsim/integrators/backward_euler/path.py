@@ -17,6 +17,7 @@ from flocsim.geometry.contact.points import normal_component
 from flocsim.hooks import SLIP_LIMIT, has
 from flocsim.integrators.backward_euler.contact_mean import flag_close, normal_stiffness
 from flocsim.integrators.backward_euler.interior import (
+    DECIDED_RATIO,
     change_pairs,
     evaluate_law,
     is_decided,
@@ -53,10 +54,6 @@ FULL_STEP of its change."""
 UNFREEZE, MIN_PRODUCT = 0.1, 1e-10
 """Mean product, over the square of a typical overlap, below which gaps are no longer frozen; and
 the smallest τ, in the same unit."""
-
-DECIDED_FRACTION = 0.01
-"""A contact is known to be open or closed where the smaller of δ and s is below this fraction of a
-typical δ."""
 
 NEWTON_RADIUS = 10.0
 """Largest last change, over Newton's own tolerance, from which Newton's method finds the end once
@@ -141,14 +138,14 @@ def start_warm(scene, work, step, overlap_scale):
             elif geometry.gap < 0.0:
                 contact.overlap, contact.slack = overlap_scale, target / overlap_scale
             else:
-                contact.slack = max(geometry.gap, DECIDED_FRACTION * overlap_scale)
+                contact.slack = max(geometry.gap, DECIDED_RATIO * overlap_scale)
                 contact.overlap = target / contact.slack
             evaluate_law(scene, work, row, step, True)
             limit, side = contact.friction_limit, work.candidates[row].slide_direction
             if limit > 0.0:
                 # Sliding contacts begin near their limit.
                 fraction = float(side) if side != 0 else contact.sticking_force / limit
-                fraction = min(max(fraction, DECIDED_FRACTION - 1.0), 1.0 - DECIDED_FRACTION)
+                fraction = min(max(fraction, DECIDED_RATIO - 1.0), 1.0 - DECIDED_RATIO)
                 slides = side * (contact.sticking_force - fraction * limit)
                 set_friction(work, row, fraction, target)
                 if side > 0:
@@ -225,7 +222,7 @@ def follow_true_gaps(scene, work, clock, step, overlap_scale, own):
             return False
         # All decided and feasible: Newton's method can finish.
         near = change <= NEWTON_RADIUS * final_tolerance(scene, work, clock, step)
-        if near and fraction > FULL_STEP and is_decided(work, DECIDED_FRACTION * overlap_scale):
+        if near and fraction > FULL_STEP and is_decided(work, DECIDED_RATIO * overlap_scale):
             return solve_end(scene, work, clock, step)
     return False
 

@@ -14,20 +14,16 @@ from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.hooks import SLIP_LIMIT, awaits_touch, contact_event, has
 from flocsim.integrators.events.crossings import NEVER, first_switch
 from flocsim.integrators.events.grazes import first_grazing_end
-from flocsim.integrators.rhs.error import largest_coordinate, step_tolerance
+from flocsim.integrators.events.resolution import OVERLAP_FRACTION
+from flocsim.integrators.rhs.error import at_least_rounding, step_tolerance
 from flocsim.integrators.rhs.friction import set_sliding, slip_transition
 from flocsim.integrators.rhs.views import contact_view, view_without_slip
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import NEW, NOW
 
 RESOLUTION = 1e-3
-"""A switch is located to this fraction of the tolerance, …"""
-
-RESOLUTION_OF_OVERLAP = 0.02
-"""… and to this fraction of the deepest overlap, …"""
-
-ROUNDING = 4e-16
-"""… but not finer than this fraction of the coordinates whose difference the gap is."""
+"""A switch is located to this fraction of the tolerance, and to OVERLAP_FRACTION of the deepest
+overlap, but not finer than the rounding of coordinates."""
 
 KINK_FINENESS = 1e-4
 """A kink is located to this fraction of its distance at the start of the step."""
@@ -47,8 +43,8 @@ def switch_resolutions(work, clock):
     # While contacts are pressed, resolve a fraction of the deepest overlap.
     deepest = -least_listed_gap(work)
     if deepest > 0.0:
-        resolution = min(resolution, RESOLUTION_OF_OVERLAP * deepest)
-    resolution = max(resolution, ROUNDING * largest_coordinate(work, NEW))
+        resolution = min(resolution, OVERLAP_FRACTION * deepest)
+    resolution = at_least_rounding(work, NEW, resolution)
     if deepest > 0.0:
         return resolution, resolution
     # While nothing overlaps, touches shallower than SHALLOWEST_TOUCH do not count.

@@ -2,24 +2,21 @@
 
 A pair that has just parted goes on grazing (rhs/friction.py) instead of opening if its own
 tangential force has lifted it and the consequences are far below the tolerance: how high it would
-fly, and the displacement that its tangential spring would lose. The force that the spring releases
-must be negligible, too, unless the pair chatters, having parted and touched again several times
-like that: a first graze in an impact caused errors of fifty tolerances. Two contacts that throw
-each other open in turn do not graze: they are followed, as is the contact law itself where the
-tolerance resolves all this.
+fly, and the displacement that its tangential spring would lose. It must have parted and touched
+again several times like that: a first graze in an impact caused errors of fifty tolerances. Two
+contacts that throw each other open in turn do not graze: they are followed, as is the contact law
+itself where the tolerance resolves all this.
 """
 
-import math
-
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.points import contact_point
+from flocsim.geometry.contact.candidates import SAME_POINT
+from flocsim.geometry.contact.points import contact_point, length_of
 from flocsim.hooks import contact_derivatives, contact_force
 from flocsim.integrators.events.crossings import NEVER
 from flocsim.integrators.rhs.error import at_least_rounding
 from flocsim.integrators.rhs.friction import (
     GRAZING_STIFFNESS_RATIO,
     grazing_force,
-    normal_mobility,
     tangential_coupling,
 )
 from flocsim.integrators.rhs.views import (
@@ -36,79 +33,38 @@ FLIGHT_HEIGHT = 0.1
 """A chattering pair grazes if its speed would lift it by less than this fraction of the
 tolerance."""
 
-FIRST_FLIGHT_HEIGHT = 1e-3
-"""The same for a pair that does not chatter yet."""
-
-MOST_LOST_SLIP = 1.0
-"""Largest ξ, in tolerances, that may be lost with the tangential spring."""
-
-FIRST_RELEASE = 30.0
-"""Largest displacement, in tolerances, by the speed that a tangential spring releases when a
-contact parts that does not chatter yet."""
-
 CHATTER_COUNT = 5
 """A pair chatters after this many flights in a row of no more than FLIGHT_HEIGHT."""
-
-LEAST_COUPLING = 0.1
-"""Lower bound of a tangential force's effect on the gap, over that of a normal force: other
-contacts may couple the two even if this one does not."""
-
-LEAST_PULL = 1e-3
-"""A contact force that pulls at no overlap by more than this fraction of T holds the pair by
-itself."""
-
-SAME_POINT = 1e-9
-"""Contact points nearer than this [m] are one."""
-
-FAR = 1e3
-"""A gap that exceeds its offset by this factor is far from where the pair grazed."""
 
 LATE_EFFECT = 0.1
 """A step may pass the end of grazing if that displaces bodies by less than this fraction of the
 tolerance; the force passes through zero there."""
 
-END_OVERSHOOT = 1.01
-"""A step that may not pass the end of grazing ends this little after it."""
-
 START_FRACTION = 0.02
-"""Grazing that ends within this fraction of a step ends at its start."""
+"""Grazing that ends within this fraction of a step ends at its start; a step that may not pass the
+end of grazing ends this much after it."""
 
 TOUCHING_GAP = -1e-30
 """Gap of a pair that touches without overlap [m]: only its sign matters."""
 
 
-def gap_coupling(scene, work, row):
-    """Return the acceleration of the gap per unit tangential force on a pair [1/kg], bounded from
-    below."""
-    least = LEAST_COUPLING * normal_mobility(scene, work, row)
-    return max(abs(tangential_coupling(scene, work, row)), least)
-
-
 def begins_grazing(scene, work, clock, row):
     """Return True if a pair that has just parted grazes from now on."""
-    # Neither sliding pairs (there is a Coulomb limit) nor two that throw each other open.
-    if work.candidates[row].slide_direction != 0 or chatters_in_turn(work, row):
+    # Only pairs that chatter: neither sliding ones (there is a Coulomb limit) nor two that throw
+    # each other open.
+    sliding = work.candidates[row].slide_direction != 0
+    if sliding or not chatters(work, row) or chatters_in_turn(work, row):
         return False
     # Height of the flight: v²/(2 a), with the acceleration a that its own tangential force causes.
     view = contact_view(scene, work, NOW, row)
     _, force = contact_force(scene, view)
-    speed, pull = normal_rate(work, NOW, row), abs(force) * gap_coupling(scene, work, row)
-    share = FLIGHT_HEIGHT if chatters(work, row) else FIRST_FLIGHT_HEIGHT
-    if speed * speed > 2.0 * pull * share * clock.tolerance:
+    speed, pull = normal_rate(work, NOW, row), abs(force * tangential_coupling(scene, work, row))
+    if speed * speed > 2.0 * pull * FLIGHT_HEIGHT * clock.tolerance:
         return False
     # A normal force that acts without overlap, such as cohesion, holds or opens the pair by itself.
     pull, _ = contact_force(scene, view_without_slip(view, 0.0, 0.0))
-    if abs(pull) > LEAST_PULL * abs(force):
-        return False
-    # Effects of the spring that is lost: the speed it releases, and its displacement.
-    spring = tangential_stiffness(scene, view)
-    if spring == 0.0:
-        return True
-    if not chatters(work, row):
-        kick = abs(force) / math.sqrt(spring * view.effective_mass)
-        if kick * velocity_lifetime_of(work, row) > FIRST_RELEASE * clock.tolerance:
-            return False
-    return abs(force) <= MOST_LOST_SLIP * clock.tolerance * spring
+    # The displacement that is lost with the spring must be below the tolerance.
+    return pull == 0.0 and abs(force) <= clock.tolerance * tangential_stiffness(scene, view)
 
 
 def tangential_stiffness(scene, view):
@@ -118,10 +74,11 @@ def tangential_stiffness(scene, view):
 
 def same_point(work, row, other):
     """Return True if two rows have the same contact point."""
-    body = work.candidates[row].vertex_body
-    x, y = contact_point(work, row, body)
-    other_x, other_y = contact_point(work, other, body)
-    return math.hypot(other_x - x, other_y - y) < SAME_POINT
+    candidate = work.candidates[row]
+    x, y = contact_point(work, row, candidate.vertex_body)
+    other_x, other_y = contact_point(work, other, candidate.vertex_body)
+    near = SAME_POINT * (candidate.vertex_radius + candidate.edge_radius)
+    return length_of(other_x - x, other_y - y) < near
 
 
 def coincides(work, row, other):
@@ -228,13 +185,12 @@ def continues_grazing(scene, work, row):
     return True
 
 
-def drop_gap_offset(work, row):
+def drop_gap_offset(work, clock, row):
     """Drop the gap offset of a pair that is far from where it grazed."""
     geometry = work.geometry[NOW, row]
     contact = work.contacts[row]
-    offset = contact.gap_offset
-    if offset != 0.0 and geometry.gap > FAR * abs(offset):
-        geometry.gap += offset
+    if contact.gap_offset != 0.0 and geometry.gap > clock.tolerance:
+        geometry.gap += contact.gap_offset
         contact.gap_offset = 0.0
 
 
@@ -306,7 +262,7 @@ def update_grazing_pairs(scene, work, clock, step):
         if mode == GRAZING:
             changed = not continues_grazing(scene, work, row) or changed
         elif mode == OPEN:
-            drop_gap_offset(work, row)
+            drop_gap_offset(work, clock, row)
             track_flight(work, clock, row)
             if work.geometry[NOW, row].gap < 0.0:
                 count_short_flight(work, clock, step, row)
@@ -390,5 +346,5 @@ def first_grazing_end(work, clock, step, share):
     ``share``."""
     for row in range(work.tally.candidates):
         if work.candidates[row].contact_mode == GRAZING:
-            share = min(share, END_OVERSHOOT * grazing_end_share(work, clock, step, row))
+            share = min(share, (1.0 + START_FRACTION) * grazing_end_share(work, clock, step, row))
     return share

@@ -11,20 +11,17 @@ from flocsim.integrators.rhs.contact_stiffness import normal_force_at, secant_st
 from flocsim.integrators.rhs.error import at_least_rounding
 from flocsim.integrators.rhs.views import contact_view, normal_rate, velocity_lifetime_of
 
-SHARE_OF_DEPTH = 0.02
+OVERLAP_FRACTION = 0.02
 """Where bodies rebound, their touch is located to this fraction of the depth of the impact,
-speed/ω0."""
+speed/ω0; while contacts are pressed, switches to this fraction of the deepest overlap."""
 
 SHARE_OF_DAMPED = 0.3
 """Where they do not, to this fraction: their rest may depend on far less than the tolerance, and a
 touch noticed deeper than the impact gets has a force that the bodies never caused."""
 
-MOST_LATER = 100.0
-"""Touches are located so finely that the velocity error leads to at most this multiple of the
-resolution."""
-
 MOST_AFTER_RELEASE = 1e3
-"""The same for releases: a step that has to be cut there costs more than a finer value is worth."""
+"""Releases are located so finely that the velocity error leads to at most this multiple of the
+resolution: a step that has to be cut there costs more than a finer value is worth."""
 
 NEARLY = 0.99
 """Margin that tells critical damping from less in spite of rounding."""
@@ -51,11 +48,8 @@ def touch_resolution(scene, work, state, row, resolution):
     # Inelastic: a fraction of the depth of the impact.
     if not bounces(scene, view, speed, frequency):
         return at_least_rounding(work, state, min(resolution, SHARE_OF_DAMPED * speed / frequency))
-    # Elastic: the velocity error ω0 g displaces the bodies by ω0 g T.
-    by_lifetime = MOST_LATER * resolution / max(frequency * velocity_lifetime_of(work, row), TINY)
-    return at_least_rounding(
-        work, state, min(resolution, SHARE_OF_DEPTH * speed / frequency, by_lifetime)
-    )
+    # Elastic: a smaller one.
+    return at_least_rounding(work, state, min(resolution, OVERLAP_FRACTION * speed / frequency))
 
 
 def release_resolution(scene, work, state, row, resolution):
