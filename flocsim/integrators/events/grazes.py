@@ -2,11 +2,14 @@
 
 A pair that has just parted goes on grazing (rhs/friction.py) instead of opening if its own
 tangential force has lifted it and the consequences are far below the tolerance: how high it would
-fly, and the displacement that its tangential spring would lose. It must have parted and touched
-again several times like that: a first graze in an impact caused errors of fifty tolerances. Two
-contacts that throw each other open in turn do not graze: they are followed, as is the contact law
-itself where the tolerance resolves all this.
+fly, and the displacement that its tangential spring would lose. The force that the spring releases
+must be negligible, too, unless the pair chatters, having parted and touched again several times
+like that: a first graze in an impact caused errors of fifty tolerances. Two contacts that throw
+each other open in turn do not graze: they are followed, as is the contact law itself where the
+tolerance resolves all this.
 """
+
+import math
 
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.candidates import SAME_POINT
@@ -33,6 +36,10 @@ FLIGHT_HEIGHT = 0.1
 """A chattering pair grazes if its speed would lift it by less than this fraction of the
 tolerance."""
 
+FIRST_FLIGHT_HEIGHT, FIRST_RELEASE = 1e-3, 30.0
+"""The same for a pair that does not chatter yet; and the largest displacement, in tolerances, by
+the speed that its tangential spring releases."""
+
 CHATTER_COUNT = 5
 """A pair chatters after this many flights in a row of no more than FLIGHT_HEIGHT."""
 
@@ -50,21 +57,27 @@ TOUCHING_GAP = -1e-30
 
 def begins_grazing(scene, work, clock, row):
     """Return True if a pair that has just parted grazes from now on."""
-    # Only pairs that chatter: neither sliding ones (there is a Coulomb limit) nor two that throw
-    # each other open.
-    sliding = work.candidates[row].slide_direction != 0
-    if sliding or not chatters(work, row) or chatters_in_turn(work, row):
+    # Neither sliding pairs (there is a Coulomb limit) nor two that throw each other open.
+    if work.candidates[row].slide_direction != 0 or chatters_in_turn(work, row):
         return False
     # Height of the flight: v²/(2 a), with the acceleration a that its own tangential force causes.
     view = contact_view(scene, work, NOW, row)
     _, force = contact_force(scene, view)
     speed, pull = normal_rate(work, NOW, row), abs(force * tangential_coupling(scene, work, row))
-    if speed * speed > 2.0 * pull * FLIGHT_HEIGHT * clock.tolerance:
+    share = FLIGHT_HEIGHT if chatters(work, row) else FIRST_FLIGHT_HEIGHT
+    if speed * speed > 2.0 * pull * share * clock.tolerance:
         return False
     # A normal force that acts without overlap, such as cohesion, holds or opens the pair by itself.
     pull, _ = contact_force(scene, view_without_slip(view, 0.0, 0.0))
-    # The displacement that is lost with the spring must be below the tolerance.
-    return pull == 0.0 and abs(force) <= clock.tolerance * tangential_stiffness(scene, view)
+    if pull != 0.0:
+        return False
+    # Effects of the spring that is lost: the speed it releases, and its displacement.
+    spring = tangential_stiffness(scene, view)
+    if spring > 0.0 and not chatters(work, row):
+        kick = abs(force) / math.sqrt(spring * view.effective_mass)
+        if kick * velocity_lifetime_of(work, row) > FIRST_RELEASE * clock.tolerance:
+            return False
+    return spring == 0.0 or abs(force) <= clock.tolerance * spring
 
 
 def tangential_stiffness(scene, view):
