@@ -243,8 +243,9 @@ def compiler_complaint(text: str) -> str:
     text = re.sub(r"(\x1b|\\x1b)\[[0-9;]*m", "", text).replace("\\n", "\n")
     lines = [each.strip() for each in text.splitlines() if each.strip()]
     words = next((each for each in lines if not each.startswith("Failed in nopython")), lines[0])
-    # The first place that is no file of a package; errors of `return` name it in other words.
-    place = re.search(r"During: .* at (?!.*-packages)([^<\n].*) \((\d+)\)", text)
+    # The first place that is no file of a package, nor this one; errors of `return` name it in
+    # other words.
+    place = re.search(r"During: .* at (?!.*-packages|.*units\.py)([^<\n].*) \((\d+)\)", text)
     place = place or re.search(r'File "([^<\n"]+)", line (\d+)', text)
     where = f"{place[1]}:{place[2]}: " if place else ""
     return f"a kernel cannot be compiled: {where}{words[:300]}; {SCALARS_ONLY}"

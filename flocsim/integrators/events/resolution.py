@@ -19,9 +19,9 @@ SHARE_OF_DAMPED = 0.3
 """Where they do not, to this fraction: their rest may depend on far less than the tolerance, and a
 touch noticed deeper than the impact gets has a force that the bodies never caused."""
 
-MOST_AFTER_RELEASE = 1e3
-"""Releases are located so finely that the velocity error leads to at most this multiple of the
-resolution: a step that has to be cut there costs more than a finer value is worth."""
+MOST_LATER = 1e3
+"""Touches of bodies that rebound and releases are located so finely that the velocity error leads
+to at most this multiple of the resolution: to some tolerance."""
 
 NEARLY = 0.99
 """Margin that tells critical damping from less in spite of rounding."""
@@ -48,8 +48,11 @@ def touch_resolution(scene, work, state, row, resolution):
     # Inelastic: a fraction of the depth of the impact.
     if not bounces(scene, view, speed, frequency):
         return at_least_rounding(work, state, min(resolution, SHARE_OF_DAMPED * speed / frequency))
-    # Elastic: a smaller one.
-    return at_least_rounding(work, state, min(resolution, OVERLAP_FRACTION * speed / frequency))
+    # Elastic: a smaller one, and the velocity error ω0 g displaces the bodies by ω0 g T.
+    by_lifetime = MOST_LATER * resolution / max(frequency * velocity_lifetime_of(work, row), TINY)
+    return at_least_rounding(
+        work, state, min(resolution, OVERLAP_FRACTION * speed / frequency, by_lifetime)
+    )
 
 
 def release_resolution(scene, work, state, row, resolution):
@@ -62,6 +65,6 @@ def release_resolution(scene, work, state, row, resolution):
     # The velocity error is (pull/M) g/speed; it displaces the bodies by that times T.
     pull = abs(normal_force_at(scene, view, 0.0, -speed)) / view.effective_mass
     by_lifetime = (
-        MOST_AFTER_RELEASE * resolution * speed / max(pull * velocity_lifetime_of(work, row), TINY)
+        MOST_LATER * resolution * speed / max(pull * velocity_lifetime_of(work, row), TINY)
     )
     return at_least_rounding(work, state, min(resolution, by_lifetime))
