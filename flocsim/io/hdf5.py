@@ -206,10 +206,10 @@ def describe_spawned(data: BinaryIO, seconds: int) -> bytes:
     """Return what a new process writes, "" where it is ended."""
     variables = {
         name: value for name, value in os.environ.items() if not name.startswith(MPI_VARIABLES)
-    } | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), BLAS_THREADS: "1"}  # fmt: skip
+    } | {BLAS_THREADS: "1"}  # fmt: skip
     with contextlib.suppress(subprocess.TimeoutExpired):
         return subprocess.run(
-            [sys.executable, "-P", hdf5_child.__file__],
+            [sys.executable, "-I", hdf5_child.__file__, *filter(None, sys.path)],
             stdin=data, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=variables,
             start_new_session=True, check=False, timeout=hdf5_child.PATIENCE * seconds,
         ).stdout  # fmt: skip

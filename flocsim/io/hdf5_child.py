@@ -12,6 +12,7 @@ its path, and imports nothing of flocsim, so that such a process starts quickly.
 
 import json
 import os
+import sys
 import time
 from typing import Any
 
@@ -133,4 +134,6 @@ def plain(value: Any) -> Any:
 
 
 if __name__ == "__main__":
+    # What Python itself has comes first: no file of a folder there stands in for it.
+    sys.path += sys.argv[1:]
     main()

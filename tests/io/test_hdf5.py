@@ -209,8 +209,12 @@ def test_a_process_started_anew_says_the_same(request, results, library, why):
         refused(results, LAYOUT)
 
 
-def test_the_modules_of_the_current_folder_are_not_run(results, in_tmp, mpi):
-    """A process that is started anew takes its libraries from where this one has them."""
+@pytest.mark.parametrize("listed", [False, True])
+def test_the_modules_of_the_current_folder_are_not_run(results, in_tmp, mpi, monkeypatch, listed):
+    """A process that is started anew takes its libraries from where Python has them, even if
+    ``sys.path`` begins with a folder that holds others."""
+    if listed:
+        monkeypatch.setattr(sys, "path", [str(in_tmp), *sys.path])
     (in_tmp / "json.py").write_text("raise SystemExit(3)\n", "utf-8")
     (in_tmp / "h5py.py").write_text("raise SystemExit(3)\n", "utf-8")
     assert open_hdf5(results).kind == "flocsim results"
