@@ -396,13 +396,14 @@ def mean_velocity(velocities, i):
     return 0.5 * (velocities[0, i] + velocities[2, i])
 
 
-def find_shares(c, cells, starts, grid, places, radii, own, scratch, velocities, sums):
+def find_shares(
+    c, cells, starts, grid, places, radii, own, shares, residual, direction, velocities, sums
+):
     """Write the shares of a force with which all bodies of cluster c move alike.
 
     Conjugate gradients, preconditioned by the mobility of each body alone, from shares in
     proportion to the radii.
     """
-    shares, residual, direction = scratch[0], scratch[1], scratch[2]
     first, last = starts[cells[c]], starts[cells[c + 1]]
     for i in range(first, last):
         shares[i] = radii[i]
@@ -443,18 +444,21 @@ def find_shares(c, cells, starts, grid, places, radii, own, scratch, velocities,
         shares[i] /= total
 
 
-def cluster_mobilities(cells, starts, grid, places, radii, own, scratch, velocities, sums, found):
+def cluster_mobilities(
+    cells, starts, grid, places, radii, own, shares, residual, direction, velocities, sums, found
+):
     """Write to ``found`` (c, 3) the mobilities (xx, xy, yy) [1/m] of clusters, over the viscosity.
 
     Cells of cluster c are ``cells[c]`` to ``cells[c + 1]``, bodies of cell k ``starts[k]`` to
     ``starts[k + 1]``; ``grid`` (k, 4): column and row of a cell, and the mean position of its
     bodies [m]. Of the bodies: ``places`` (n, 2) [m], unwrapped across periodic boundaries,
     ``radii`` [m] of the spheres that represent them, ``own`` (3, n) [1/m], their mobilities alone.
-    Scratch: ``scratch`` and ``velocities`` (3, n), ``sums`` (4, k).
+    Scratch: ``shares``, ``residual`` and ``direction`` (n,), ``velocities`` (3, n), ``sums`` (4, k).
     """
-    shares = scratch[0]
     for c in range(cells.shape[0] - 1):
-        find_shares(c, cells, starts, grid, places, radii, own, scratch, velocities, sums)
+        find_shares(
+            c, cells, starts, grid, places, radii, own, shares, residual, direction, velocities, sums
+        )
         cluster_velocities(c, cells, starts, grid, places, radii, own, shares, velocities, sums)
         for i in range(starts[cells[c]], starts[cells[c + 1]]):
             for k in range(3):
@@ -492,6 +496,7 @@ def mobilities(
     compiled(cluster_mobilities, what="the drag of clusters")(
         np.searchsorted(known[starts, 0], np.arange(len(count) + 1)).astype(np.int64),
         np.append(starts, len(label)), np.hstack([known[starts, 1:], middle]), places, radii,
-        own[order].T.copy(), *np.zeros((2, 3, len(label))), np.zeros((4, len(starts))), found,
+        own[order].T.copy(), *np.zeros((3, len(label))), np.zeros((3, len(label))),
+        np.zeros((4, len(starts))), found,
     )  # fmt: skip
     return found

@@ -8,6 +8,7 @@ from scipy.special import erfc, ive, kve
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds.certificate import CERTIFICATE, NO_BOND, REST
+from flocsim.bonds.escape import BARRIER
 from flocsim.constants import BOLTZMANN
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.attraction import GAPS, caged_between, speeds_of
@@ -27,7 +28,6 @@ from flocsim.forces import DoubleLayer, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
-from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.state.bodies import X
 from flocsim.state.work import NOW, motion_of
 from tests.helpers.small_study import small_config
