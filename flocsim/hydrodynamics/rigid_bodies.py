@@ -453,7 +453,8 @@ def cluster_mobilities(
     ``starts[k + 1]``; ``grid`` (k, 4): column and row of a cell, and the mean position of its
     bodies [m]. Of the bodies: ``places`` (n, 2) [m], unwrapped across periodic boundaries,
     ``radii`` [m] of the spheres that represent them, ``own`` (3, n) [1/m], their mobilities alone.
-    Scratch: ``shares``, ``residual`` and ``direction`` (n,), ``velocities`` (3, n), ``sums`` (4, k).
+    Scratch: ``shares``, ``residual`` and ``direction`` (n,), ``velocities`` (3, n), and ``sums``
+    (4, k).
     """
     for c in range(cells.shape[0] - 1):
         find_shares(
