@@ -458,7 +458,18 @@ def cluster_mobilities(
     """
     for c in range(cells.shape[0] - 1):
         find_shares(
-            c, cells, starts, grid, places, radii, own, shares, residual, direction, velocities, sums
+            c,
+            cells,
+            starts,
+            grid,
+            places,
+            radii,
+            own,
+            shares,
+            residual,
+            direction,
+            velocities,
+            sums,
         )
         cluster_velocities(c, cells, starts, grid, places, radii, own, shares, velocities, sums)
         for i in range(starts[cells[c]], starts[cells[c + 1]]):
