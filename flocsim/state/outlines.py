@@ -27,12 +27,15 @@ class CorePoint(Record):
 ) = range(3)
 
 
-class Circle(Record):
-    """A circle around a run of core points and edges, in the frame of their body."""
+FeatureRows = Annotated[np.ndarray, ("features",), np.int64]
 
-    x: float  # centre [m]
-    y: float
-    radius: float  # [m]
+
+class NearFeatures(NamedTuple):
+    """Core points of two bodies at which features near the other body begin; element 0 of each list
+    is its length."""
+
+    later: FeatureRows
+    earlier: FeatureRows
 
 
 class Piece(Record):

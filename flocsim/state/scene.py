@@ -49,7 +49,6 @@ class Scene(NamedTuple):
     bodies: np.ndarray  # (n,) of BodyConstants
     first: np.ndarray  # (n + 1,): index of a body's first core point in ``vertices``
     vertices: np.ndarray  # (points,) of outlines.CorePoint
-    tree: np.ndarray  # (2 points,) of outlines.Circle: circles around them, see near_pairs
     pieces: np.ndarray  # (pieces,) of outlines.Piece; empty if nothing reads them
     first_piece: np.ndarray  # (n + 1,): index of a body's first piece
     groups: np.ndarray  # (groups,) of outlines.ChargeGroup; empty likewise

@@ -25,6 +25,7 @@ from flocsim.state.outlines import (
     MOST_FEET,
     MOST_ORDER,
     Listed,
+    NearFeatures,
     NearPieces,
     Nodes,
     gauss_rules,
@@ -142,6 +143,7 @@ class Work(NamedTuple):
     candidates: Annotated[np.ndarray, ("rows",), Candidate]
     geometry: Annotated[np.ndarray, (STATES, "rows"), VertexAtEdge]
     kept: Annotated[np.ndarray, ("rows",), SavedContact]
+    near_features: NearFeatures
     near: NearPieces
     listed: Listed
     feet: Annotated[np.ndarray, (MOST_FEET,)]  # parameters of those on a piece: rhs.outline_nodes
@@ -211,7 +213,8 @@ def work_of(
     work: Work = zeros_of(
         Work,
         n=n, after=n + 1, unknowns=3 * n, few=few, dense=3 * few, rows=capacity,
-        many=many, ends=many + 1, room=room, pieces=len(scene.pieces) + 1,
+        many=many, ends=many + 1, room=room,
+        pieces=len(scene.pieces) + 1, features=len(scene.vertices) + 1,
         **sizes_of_pairs(n, pairs, room),
     )._replace(rules=gauss_rules())  # fmt: skip
     begin(work, scene, position, velocity, all_pairs)
@@ -237,6 +240,13 @@ def begin(
     work.place[NOW], work.velocity[NOW] = position, velocity
     if len(scene.bodies) <= ALL_PAIRS and all_pairs:
         work.tally.pairs = all_counting(scene.bodies, work.pairs)
+
+
+def fits(work: Work, scene: Scene) -> bool:
+    """Return True if the work arrays of a scene have the sizes that another one of as many bodies
+    needs."""
+    sizes = len(work.near_features.later), len(work.near.first)
+    return sizes == (len(scene.vertices) + 1, len(scene.pieces) + 1)
 
 
 def begin_anew(work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from flocsim.state.bodies import MOTION_COLUMNS, BodyConstants, Disc
 from flocsim.state.clock import Clock
 from flocsim.state.declared import zeros_of
-from flocsim.state.outlines import Circle, CorePoint
+from flocsim.state.outlines import CorePoint
 from flocsim.state.scene import Scene
 
 ERROR_COLUMNS = 6
@@ -76,10 +76,9 @@ TRACK_COLUMNS = BOXES + STRETCHES * BOX_COLUMNS
 class Swarm(NamedTuple):
     """n bodies at a common time, and at the window's end."""
 
-    bodies: Annotated[np.ndarray, ("n",), BodyConstants]  # this and the next three as in a Scene
+    bodies: Annotated[np.ndarray, ("n",), BodyConstants]  # this and the next two as in a Scene
     first: Annotated[np.ndarray, ("after",), np.int64]
     vertices: Annotated[np.ndarray, (0,), CorePoint]
-    tree: Annotated[np.ndarray, (0,), Circle]
     motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
     carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # the vector of the state's error
     errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]  # what errors of steps have led to
@@ -108,7 +107,7 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: Cl
     ``clock`` that its method begins with."""
     n = len(scene.bodies)
     swarm: Swarm = zeros_of(Swarm, n=n, after=n + 1, k=0)._replace(
-        bodies=scene.bodies, first=scene.first, vertices=scene.vertices, tree=scene.tree
+        bodies=scene.bodies, first=scene.first, vertices=scene.vertices
     )
     swarm.motion[:] = swarm.new_motion[:] = np.hstack([position, velocity])
     swarm.steps[:] = swarm.new_steps[:] = clock.step

@@ -75,8 +75,6 @@ def put_scene(swarm, scene, members, first):
         begin, end = swarm.first[member], swarm.first[member + 1]
         for each in range(begin, end):
             scene.vertices[point + each - begin] = swarm.vertices[each]
-        for row in range(2 * (end - begin)):
-            scene.tree[2 * point + row] = swarm.tree[2 * begin + row]
         point += end - begin
     scene.first[scene.bodies.shape[0]] = point
 

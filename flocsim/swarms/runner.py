@@ -18,7 +18,7 @@ from flocsim.run import extended
 from flocsim.state.clock import NOTHING_FULL, Clock, Counts
 from flocsim.state.contacts import BodyPair
 from flocsim.state.declared import enlarged, zeros_of
-from flocsim.state.outlines import Circle, CorePoint
+from flocsim.state.outlines import CorePoint
 from flocsim.state.scene import Scene
 from flocsim.state.work import Work, work_of
 from flocsim.swarms.arrays import Found, Swarm
@@ -93,7 +93,6 @@ class ThreadArrays:
                 bodies=np.resize(self.template.bodies, size),
                 first=np.zeros(size + 1, dtype=np.int64),
                 vertices=CorePoint.rows(points),
-                tree=Circle.rows(2 * points),
             )
             zeros = np.zeros((size, 3))
             few = 1 < size <= FEW

@@ -35,7 +35,7 @@ from flocsim.geometry.contact.core_points import Outlines, outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.io.results.schema import SHAPE_MEASURES
 from flocsim.state.scene import Scene
-from flocsim.state.work import Work, begin_anew, work_of
+from flocsim.state.work import Work, begin_anew, fits, work_of
 from flocsim.system import System
 
 LIMIT_TURNS = 1000.0
@@ -310,8 +310,8 @@ class Encounter(abc.ABC):
         """Return work arrays of a replicate with these angles [rad] and ``share``: see Draw."""
         place, velocity = map(np.array, self.places(angles, share))
         with contextlib.suppress(IndexError):  # none is left, or another thread has taken it
-            while (work := self.spare.pop()).near.first.shape[0] != len(self.scene.pieces) + 1:
-                pass  # of another number of parts
+            while not fits(work := self.spare.pop(), self.scene):
+                pass
             begin_anew(work, self.scene, place, velocity)
             return work
         return work_of(self.scene, place, velocity)

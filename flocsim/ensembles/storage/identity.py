@@ -19,7 +19,7 @@ from numpy.lib.recfunctions import structured_to_unstructured
 
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kind import PHYSICS, StudyKind
-from flocsim.geometry.contact.core_points import circles_of, core_points
+from flocsim.geometry.contact.core_points import core_points
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, resized
 
@@ -165,9 +165,7 @@ def star_numbers(points):
     rays = 5.0 + np.sin(3.0 * turn + 0.4)
     star = SpheroPolygon(np.column_stack([rays * np.cos(turn), rays * np.sin(turn)]), 0.3)
     body = resized(star, 1.641e-5, 1e-6)
-    return np.concatenate(
-        [shape_numbers(body), np.ravel(structured_to_unstructured(circles_of(body)))]
-    )
+    return shape_numbers(body)
 
 
 def physics_digest(root: Path = PACKAGE, names: Sequence[str] = PHYSICS) -> str:

@@ -1,11 +1,11 @@
-"""Near vertex–edge pairs of two outlines, and their smallest distance, by trees of circles.
+"""Near vertex–edge pairs of two outlines, and their smallest distance.
 
-Two trees (core_points.py) are traversed against each other without a stack: which of the two is
-split next follows from the sizes of their pieces alone, so the way back up is known as well.
+A feature is a core point with the edge that begins there. Only features near the other body's
+centroid can be near its outline: these are found first, then compared with each other.
 
 Distances are computed in the frame of one body. A *pose* (c, s, x, y) rotates and shifts points of
-the other body into it, for visited nodes only. Inner functions receive scalars and single arrays
-instead of the whole scene, which would cost more to pass than they do to run.
+the other body into it. Inner functions receive scalars and single arrays instead of the whole
+scene, which would cost more to pass than they do to run.
 
 A lone point touches edges as a vertex, and other lone points. Two lone points form one pair, in
 which the later body provides the vertex.
@@ -15,7 +15,6 @@ import math
 from collections.abc import Callable
 
 from flocsim.geometry.contact import points as contacts
-from flocsim.geometry.contact.core_points import leaves_of
 from flocsim.geometry.contact.points import length_of, separation
 from flocsim.geometry.shapes.cores import segment_distance2
 from flocsim.hooks import hook
@@ -25,178 +24,73 @@ from flocsim.state.outlines import EDGE, LONE
 from flocsim.state.work import NOW
 
 
-def tree_side(outlines, body):
-    """Return (first core point, number, first row of the tree, leaves) of a body's outline."""
-    first = outlines.first[body]
-    points = outlines.first[body + 1] - first
-    return first, points, 2 * first, leaves_of(points)
-
-
-def leaf_points(side, leaf):
-    """Return (first, end) of the core points of a leaf."""
-    first, points, _, leaves = side
-    # The same integer bounds as in `circles_of`: exact, since the divisor is a power of two.
-    share = points / leaves
-    place = leaf - leaves
-    return first + int(place * share), first + int((place + 1) * share)
-
-
 def reversed_pose(pose):
     """Return the inverse pose, which maps the other body's points into the frame of this one."""
     c, s, x, y = pose
     return c, -s, -c * x - s * y, s * x - c * y
 
 
-def in_other_frame(pose, x, y):
-    """Return a point of one body in the frame of the other [m]."""
+def in_other_frame(pose, vertices, point):
+    """Return a core point of one body in the frame of the other [m]."""
     c, s, shift_x, shift_y = pose
+    x, y = vertices[point].x, vertices[point].y
     return c * x - s * y + shift_x, s * x + c * y + shift_y
 
 
-def edge_distance2(vertices, x, y, start, end):
-    """Return the squared distance of a point from the edge between two core points [m²]."""
+def edge_distance2(vertices, x, y, point):
+    """Return the squared distance of a position from the feature that begins at a core point
+    [m²]."""
+    end = point + vertices[point].edge_offset
     return segment_distance2(
-        x, y, vertices[start].x, vertices[start].y, vertices[end].x, vertices[end].y
+        x, y, vertices[point].x, vertices[point].y, vertices[end].x, vertices[end].y
     )
 
 
-def traversal_plan(tree, side_a, side_b):
-    """Return the constants of a traversal: first rows, leaves and root radii of both trees."""
-    _, _, row_a, leaves_a = side_a
-    _, _, row_b, leaves_b = side_b
-    size_a, size_b = tree[row_a + 1].radius, tree[row_b + 1].radius
-    return row_a, row_b, leaves_a, leaves_b, size_a, size_b
+def extent_of(outlines, body):
+    """Return the largest distance of a body's core from its centroid, the excess of spheroradii
+    included [m]."""
+    largest, vertices = 0.0, outlines.vertices
+    for point in range(outlines.first[body], outlines.first[body + 1]):
+        away = length_of(vertices[point].x, vertices[point].y)
+        largest = max(largest, away + vertices[point].excess_radius)
+    return largest
 
 
-START = (1, 1, 1, 1)
-"""The traversal at both roots: node of a, node of b, number of nodes on a's level, on b's level.
-
-A traversal has ended when its first number is 0.
-"""
-
-
-def has_nodes(walk):
-    i, _, _, _ = walk
-    return i > 0
-
-
-def circle_distance(tree, pose, plan, walk):
-    """Return (squared distance of centres, sum of radii) of the circles of the two nodes."""
-    i, j, _, _ = walk
-    row_a, row_b, _, _, _, _ = plan
-    one, other = row_a + i, row_b + j
-    # Only the centre of a's circle is transformed, and only here.
-    x, y = in_other_frame(pose, tree[one].x, tree[one].y)
-    dx, dy = x - tree[other].x, y - tree[other].y
-    return dx * dx + dy * dy, tree[one].radius + tree[other].radius
-
-
-def may_be_closer(tree, pose, plan, walk, distance):
-    """Return True if the runs of the two nodes may be closer to each other than a distance [m].
-
-    The distance is negative where cores of different spheroradii overlap.
-    """
-    distance2, radii = circle_distance(tree, pose, plan, walk)
-    reach = radii + distance
-    return reach > 0.0 and distance2 < reach * reach
-
-
-def at_leaves(plan, walk):
-    _, _, level_a, level_b = walk
-    _, _, leaves_a, leaves_b, _, _ = plan
-    return level_a == leaves_a and level_b == leaves_b
-
-
-def descend(plan, walk):
-    """Return the traversal at the first child of the larger piece, a's if they are equal."""
-    i, j, level_a, level_b = walk
-    _, _, leaves_a, leaves_b, size_a, size_b = plan
-    # A piece on a level of n nodes is about 1/n of its outline.
-    larger = size_a * level_b >= size_b * level_a
-    if level_a < leaves_a and (larger or level_b == leaves_b):
-        return 2 * i, j, 2 * level_a, level_b
-    return i, 2 * j, level_a, 2 * level_b
-
-
-def skip_subtree(plan, walk):
-    """Return the traversal at the successor of the two nodes, skipping everything below them."""
-    i, j, level_a, level_b = walk
-    _, _, _, _, size_a, size_b = plan
-    while level_a * level_b > 1:
-        # Pieces are split in the order of their sizes, so the smaller piece was split last. Move to
-        # its sibling, or go up if it is the second child (odd number).
-        if level_b == 1 or (level_a > 1 and size_a * level_b < size_b * level_a):
-            if i & 1 == 0:
-                return i + 1, j, level_a, level_b
-            i, level_a = i >> 1, level_a >> 1
-        else:
-            if j & 1 == 0:
-                return i, j + 1, level_a, level_b
-            j, level_b = j >> 1, level_b >> 1
-    return 0, 0, 1, 1
-
-
-def leaf_distance_one_way(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
-    """Return the smaller of ``least`` and the distances from a's points to b's edges [m], less what
-    their spheroradii exceed the smallest by."""
-    start_a, end_a = leaf_points(side_a, leaf_a)
-    start_b, end_b = leaf_points(side_b, leaf_b)
-    for point in range(start_a, end_a):
-        x, y = in_other_frame(pose, vertices[point].x, vertices[point].y)
-        for start in range(start_b, end_b):
-            end = start + vertices[start].edge_offset
-            apart = math.sqrt(edge_distance2(vertices, x, y, start, end))
-            excess = vertices[point].excess_radius + vertices[start].excess_radius
-            least = min(least, apart - excess)
+def feature_distance(outlines, b, pose, point, least):
+    """Return the smaller of ``least`` and the distance of one feature of a body from the core of
+    body b [m], less what their spheroradii exceed the smallest by."""
+    vertices = outlines.vertices
+    x, y = in_other_frame(pose, vertices, point)
+    end_x, end_y = in_other_frame(pose, vertices, point + vertices[point].edge_offset)
+    for other in range(outlines.first[b], outlines.first[b + 1]):
+        # The vertex from the other's edge, and the other's vertex from the edge.
+        apart2 = edge_distance2(vertices, x, y, other)
+        beyond2 = segment_distance2(vertices[other].x, vertices[other].y, x, y, end_x, end_y)
+        excess = vertices[point].excess_radius + vertices[other].excess_radius
+        least = min(least, math.sqrt(min(apart2, beyond2)) - excess)
     return least
-
-
-def leaf_distance(vertices, pose, side_a, side_b, walk, least):
-    """Return the smaller of ``least`` and the distance of the runs of two leaves [m]."""
-    i, j, _, _ = walk
-    least = leaf_distance_one_way(vertices, pose, side_a, i, side_b, j, least)
-    return leaf_distance_one_way(vertices, reversed_pose(pose), side_b, j, side_a, i, least)
-
-
-def nearer_child(tree, pose, plan, walk):
-    """Return the traversal at the child of the larger piece whose circle is closer to the other
-    piece."""
-    _, _, level_a, level_b = walk
-    child = descend(plan, walk)
-    i, j, child_a, child_b = child
-    sibling = i + (child_a > level_a), j + (child_b > level_b), child_a, child_b
-    near, radii = circle_distance(tree, pose, plan, child)
-    far, other_radii = circle_distance(tree, pose, plan, sibling)
-    if math.sqrt(near) - radii <= math.sqrt(far) - other_radii:
-        return child
-    return sibling
 
 
 def core_distance(outlines, a, b, pose):
     """Return the smallest distance [m] between the cores of two bodies, from core points to edges.
 
     ``pose`` maps a's points into b's frame. For cores of several spheroradii it is negative where
-    they overlap. Branch and bound: descend directly to two close leaves for a first bound, then
-    visit only pairs of nodes that can be closer.
+    they overlap.
     """
-    vertices, tree = outlines.vertices, outlines.tree
-    side_a, side_b = tree_side(outlines, a), tree_side(outlines, b)
-    plan = traversal_plan(tree, side_a, side_b)
-    # First bound: greedy descent.
-    walk = START
-    while not at_leaves(plan, walk):
-        walk = nearer_child(tree, pose, plan, walk)
-    least = leaf_distance(vertices, pose, side_a, side_b, walk, math.inf)
-    # Full traversal, pruned with the best distance so far.
-    walk = START
-    while has_nodes(walk):
-        if not may_be_closer(tree, pose, plan, walk, least):
-            walk = skip_subtree(plan, walk)
-        elif at_leaves(plan, walk):
-            least = leaf_distance(vertices, pose, side_a, side_b, walk, least)
-            walk = skip_subtree(plan, walk)
-        else:
-            walk = descend(plan, walk)
+    vertices, reach = outlines.vertices, extent_of(outlines, b)
+    # First bound: from the feature of a that begins nearest to b's centroid.
+    nearest, least2 = outlines.first[a], math.inf
+    for point in range(outlines.first[a], outlines.first[a + 1]):
+        x, y = in_other_frame(pose, vertices, point)
+        if x * x + y * y < least2:
+            nearest, least2 = point, x * x + y * y
+    least = feature_distance(outlines, b, pose, nearest, math.inf)
+    # Then all features that may be nearer.
+    back = reversed_pose(pose)
+    for point in range(outlines.first[a], outlines.first[a + 1]):
+        most = reach + least + vertices[point].excess_radius
+        if most > 0.0 and edge_distance2(vertices, back[2], back[3], point) < most * most:
+            least = feature_distance(outlines, b, pose, point, least)
     return least
 
 
@@ -208,7 +102,7 @@ def pose_of(scene, work, a, b):
     return math.cos(turn), math.sin(turn), c * x + s * y, c * y - s * x
 
 
-def add_pair(scene, work, pair, a, point, b, start, end):
+def add_pair(scene, work, pair, a, point, b, start):
     """Append a pair of features to the list; return False if there is no room."""
     row = work.tally.candidates
     if row == work.candidates.shape[0]:
@@ -216,7 +110,8 @@ def add_pair(scene, work, pair, a, point, b, start, end):
         return False
     new, points = work.candidates[row], scene.vertices
     new.vertex_body, new.vertex = a, point
-    new.edge_body, new.edge_start, new.edge_end = b, start, end
+    new.edge_body, new.edge_start = b, start
+    new.edge_end = start + points[start].edge_offset
     new.contact_mode = new.surface_active = new.slide_direction = 0
     new.pair = pair
     new.vertex_radius = scene.bodies[a].radius + points[point].excess_radius
@@ -233,50 +128,45 @@ def begins_pair(vertices, point, start, is_later):
     return vertices[start].feature == EDGE
 
 
-def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach):
-    """List pairs of one leaf's points and another leaf's edges closer than the reach; False if
-    full."""
-    vertices, is_later = scene.vertices, a == work.pairs[pair].later
-    start_a, end_a = leaf_points(side_a, leaf_a)
-    start_b, end_b = leaf_points(side_b, leaf_b)
-    room = True
-    for point in range(start_a, end_a):
-        x, y = in_other_frame(pose, vertices[point].x, vertices[point].y)
-        for start in range(start_b, end_b):
-            end = start + vertices[start].edge_offset
-            limit = reach + vertices[point].excess_radius + vertices[start].excess_radius
-            near = edge_distance2(vertices, x, y, start, end) < limit * limit
-            if near and begins_pair(vertices, point, start, is_later):
-                room = add_pair(scene, work, pair, a, point, b, start, end) and room
-    return room
+def list_features(scene, body, x, y, reach, features):
+    """List the features of a body nearer to a position in its frame than ``reach`` [m]; the first
+    element is their number."""
+    count, vertices = 0, scene.vertices
+    for point in range(scene.first[body], scene.first[body + 1]):
+        most = reach + vertices[point].excess_radius
+        if edge_distance2(vertices, x, y, point) < most * most:
+            count += 1
+            features[count] = point
+    features[0] = count
 
 
 @hook
 def list_polygons(scene, work, pair, cutoff):
     """List the pairs of features of two bodies in both roles; return False if the list is full."""
     a, b = work.pairs[pair].later, work.pairs[pair].earlier
-    side_a, side_b = tree_side(scene, a), tree_side(scene, b)
-    _, points_a, _, _ = side_a
-    _, points_b, _, _ = side_b
-    if points_a == 1 and points_b == 1:
-        return list_spheres(scene, work, pair, cutoff)
-    reach = scene.bodies[a].radius + scene.bodies[b].radius + cutoff
+    vertices, near = scene.vertices, work.near_features
     pose = pose_of(scene, work, a, b)
     back = reversed_pose(pose)
-    plan = traversal_plan(scene.tree, side_a, side_b)
-    walk = START
+    reach = scene.bodies[a].radius + scene.bodies[b].radius + cutoff
+    list_features(scene, a, back[2], back[3], extent_of(scene, b) + reach, near.later)
+    list_features(scene, b, pose[2], pose[3], extent_of(scene, a) + reach, near.earlier)
     room = True
-    while has_nodes(walk) and room:
-        if not may_be_closer(scene.tree, pose, plan, walk, reach):
-            walk = skip_subtree(plan, walk)
-        elif at_leaves(plan, walk):
-            i, j, _, _ = walk
-            # Vertices of a against edges of b, then the reverse.
-            room = list_one_way(scene, work, pair, pose, a, b, side_a, i, side_b, j, reach)
-            room = room and list_one_way(scene, work, pair, back, b, a, side_b, j, side_a, i, reach)
-            walk = skip_subtree(plan, walk)
-        else:
-            walk = descend(plan, walk)
+    for i in range(1, near.later[0] + 1):
+        point = near.later[i]
+        end = point + vertices[point].edge_offset
+        x, y = in_other_frame(pose, vertices, point)
+        end_x, end_y = in_other_frame(pose, vertices, end)
+        for j in range(1, near.earlier[0] + 1):
+            other = near.earlier[j]
+            limit = reach + vertices[point].excess_radius + vertices[other].excess_radius
+            limit *= limit
+            # The vertex of a and the edge of b, then the reverse.
+            apart2 = edge_distance2(vertices, x, y, other)
+            if apart2 < limit and begins_pair(vertices, point, other, True):
+                room = add_pair(scene, work, pair, a, point, b, other) and room
+            apart2 = segment_distance2(vertices[other].x, vertices[other].y, x, y, end_x, end_y)
+            if apart2 < limit and begins_pair(vertices, other, point, False):
+                room = add_pair(scene, work, pair, b, other, a, point) and room
     return room
 
 
@@ -285,8 +175,7 @@ def list_spheres(scene, work, pair, cutoff):
     a, b = work.pairs[pair].later, work.pairs[pair].earlier
     if sphere_gap(scene, work, a, b) >= cutoff:
         return True
-    point = scene.first[b]
-    return add_pair(scene, work, pair, a, scene.first[a], b, point, point)
+    return add_pair(scene, work, pair, a, scene.first[a], b, scene.first[b])
 
 
 def sphere_gap(scene, work, a, b):
