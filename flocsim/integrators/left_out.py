@@ -1,7 +1,7 @@
 """Parts of the engine that a scene never reaches, and that are left out to save compile time.
 
-For few bodies: the search for near pairs among many, and sparse systems; all pairs of few bodies
-are watched, and their systems are dense (flocsim.state.work: ALL_PAIRS, DENSE). For two bodies of a
+For few bodies: the search for near pairs among many; all pairs of few bodies are watched
+(flocsim.state.work: ALL_PAIRS). For two bodies of a
 System also backward Euler, which Implicit does not hand over to below FEWEST bodies
 (backward_euler/method.py). Where no force needs them: sums along outlines, sums over charges, the
 numbers of shapes that drag in a flow uses, and the resistance of water between bodies.
@@ -18,7 +18,6 @@ from flocsim.integrators.backward_euler.method import (
     no_step_across,
     step_or_give_back,
 )
-from flocsim.integrators.radau import elimination
 from flocsim.integrators.rhs import (
     charge_sum,
     forces,
@@ -27,7 +26,7 @@ from flocsim.integrators.rhs import (
     pair_resistance,
     views,
 )
-from flocsim.state.work import DENSE
+from flocsim.state.work import ALL_PAIRS
 
 
 def list_none(scene, work, cut):
@@ -43,15 +42,6 @@ def none_wandered(scene, work, state):
 def never_wanders(scene, work, fraction):
     """Return the time [s] for which the list of all pairs is valid."""
     return math.inf
-
-
-def factorise_none(scene, work, step, both):
-    """Return False: there are no sparse systems."""
-    return False
-
-
-def solve_none(work, both):
-    """Solve nothing: there are no sparse systems."""
 
 
 def add_none(scene, work, time, state):
@@ -95,12 +85,10 @@ def left_out(
     # By the number of bodies.
     if bodies < FEWEST:
         replaced |= {hand_over: keep_method, step_or_give_back: no_step_across}
-    if bodies <= DENSE:
+    if bodies <= ALL_PAIRS:
         replaced |= {
             body_pairs.list_near: list_none,
             body_pairs.travelled_share: none_wandered,
             body_pairs.time_to_travel: never_wanders,
-            elimination.factorise_sparse: factorise_none,
-            elimination.solve_sparse: solve_none,
         }
     return replaced

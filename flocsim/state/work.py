@@ -94,26 +94,26 @@ holds the tension that a strain exerts on both."""
 
 
 class Elimination(NamedTuple):
-    """Sparse linear systems of a step of many bodies: flocsim.integrators.radau.elimination."""
+    """Sparse linear systems of a step: flocsim.integrators.radau.elimination."""
 
-    place: Annotated[np.ndarray, ("many",), np.int64]  # index in the elimination order; −1: fixed
-    body: Annotated[np.ndarray, ("many",), np.int64]  # body at an index, the inverse of ``place``
+    place: Annotated[np.ndarray, ("n",), np.int64]  # index in the elimination order; −1: fixed
+    body: Annotated[np.ndarray, ("n",), np.int64]  # body at an index, the inverse of ``place``
     # First entry in ``column`` of a row's blocks left of the diagonal, and of those right of it.
-    lower: Annotated[np.ndarray, ("ends",), np.int64]
-    upper: Annotated[np.ndarray, ("many",), np.int64]
+    lower: Annotated[np.ndarray, ("after",), np.int64]
+    upper: Annotated[np.ndarray, ("n",), np.int64]
     column: Annotated[np.ndarray, ("room",), np.int64]  # column indices of the blocks
     blocks: Annotated[np.ndarray, (3, "sparse", 3, 4)]  # see elimination.REAL_PART
-    where: Annotated[np.ndarray, ("many",), np.int64]  # block of the current row, by column
-    pairs: Annotated[np.ndarray, ("joined",), np.int64]  # 1: a pair is in the pattern
-    graph: Annotated[np.ndarray, ("room",), np.int64]  # scratch of the ordering
-    nodes: Annotated[np.ndarray, (8, "ends"), np.int64]  # scratch of the ordering
-    found: Annotated[np.ndarray, (3,), np.int64]  # see elimination.PATTERN
+    where: Annotated[np.ndarray, ("n",), np.int64]  # block of the current row, by column
+    joined: Annotated[np.ndarray, ("n", "n"), np.int8]  # 1: the bodies are neighbours
+    degree: Annotated[np.ndarray, ("n",), np.int64]  # number of neighbours not eliminated
+    cluster: Annotated[np.ndarray, ("n",), np.int64]  # clusters that the pattern is made for
+    pattern: Annotated[np.ndarray, (1,), np.int64]  # 1 + pairs in the pattern; 0: there is none
 
 
 class Work(NamedTuple):
     """All that changes in a run of n bodies, and scratch space; every array is reused.
 
-    Sizes: ``n`` bodies; ``few``: those of dense systems, 0 for more than DENSE; ``rows``:
+    Sizes: ``n`` bodies; ``few``: those of a series, 0 for more than MOST_IN_SERIES; ``rows``:
     candidate pairs of features; ``pairs``: pairs of bodies.
     """
 
@@ -137,9 +137,7 @@ class Work(NamedTuple):
     cluster: Annotated[np.ndarray, ("n",), np.int64]  # first body of those that act on each other
     jacobian: Annotated[np.ndarray, (2, "blocks", 3, 3)]  # 3 × 3 blocks, see rhs.blocks
     loads: Annotated[np.ndarray, (2, "unknowns"), complex]  # right-hand sides, then solutions
-    system: Annotated[np.ndarray, (2, "dense", "dense"), complex]  # of few bodies, factorised
-    pivots: Annotated[np.ndarray, (2, "dense"), np.int64]  # row exchanges of these
-    elimination: Elimination  # sparse systems of many bodies
+    elimination: Elimination  # linear systems of a step
     candidates: Annotated[np.ndarray, ("rows",), Candidate]
     geometry: Annotated[np.ndarray, (STATES, "rows"), VertexAtEdge]
     kept: Annotated[np.ndarray, ("rows",), SavedContact]
@@ -165,8 +163,8 @@ ALL_PAIRS = 12
 """Up to this number of bodies all pairs are watched; above it, only those that may come near."""
 
 
-DENSE = 6
-"""Up to this number of bodies linear systems are dense, and steps may be power series."""
+MOST_IN_SERIES = 6
+"""Up to this number of bodies steps may be power series."""
 
 
 PAIRS_A_BODY, BLOCKS_A_BODY = 8, 24
@@ -204,16 +202,15 @@ def work_of(
     blocks of sparse systems; ``all_pairs`` is True if all pairs of few bodies are watched.
     """
     n = len(scene.bodies)
-    few, many = (n, 0) if n <= DENSE else (0, n)
+    few = n if n <= MOST_IN_SERIES else 0
     if n <= ALL_PAIRS and all_pairs:
         pairs = n * (n - 1) // 2
     elif pairs is None:
         pairs = PAIRS_A_BODY * n
-    room = (BLOCKS_A_BODY * n if blocks is None else blocks) if many else 0
+    room = min(BLOCKS_A_BODY * n, n * (n - 1)) if blocks is None else blocks
     work: Work = zeros_of(
         Work,
-        n=n, after=n + 1, unknowns=3 * n, few=few, dense=3 * few, rows=capacity,
-        many=many, ends=many + 1, room=room,
+        n=n, after=n + 1, unknowns=3 * n, few=few, rows=capacity, room=room,
         pieces=len(scene.pieces) + 1, features=len(scene.vertices) + 1,
         **sizes_of_pairs(n, pairs, room),
     )._replace(rules=gauss_rules())  # fmt: skip
@@ -223,10 +220,8 @@ def work_of(
 
 def sizes_of_pairs(n: int, pairs: int, room: int) -> dict[str, int]:
     """Return the sizes that follow from the room for pairs of bodies, and for sparse blocks."""
-    many = n if n > DENSE else 0
     return {
-        "pairs": pairs, "blocks": 2 * n + 2 * pairs,
-        "joined": pairs if many else 0, "sparse": many + room,
+        "pairs": pairs, "blocks": 2 * n + 2 * pairs, "sparse": n + room,
     }  # fmt: skip
 
 

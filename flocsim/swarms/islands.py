@@ -136,8 +136,7 @@ def put_state(swarm, work, members, first):
     work.tally.candidates = work.tally.pairs = work.tally.kept = work.tally.full = 0
     work.tally.evaluations = work.tally.rebuilds = work.tally.solves = 0
     work.tally.kind = work.tally.series_terms = 0
-    for place in range(work.elimination.found.shape[0]):
-        work.elimination.found[place] = 0
+    work.elimination.pattern[0] = 0
 
 
 def local_of(members, first, size, body):

@@ -24,7 +24,8 @@ from flocsim.integrators.backward_euler.contact_mean import (
     takes_part,
 )
 from flocsim.integrators.radau.contact_frames import gather_clusters
-from flocsim.integrators.radau.systems import factorise_euler, solve_real
+from flocsim.integrators.radau.elimination import solve_blocks
+from flocsim.integrators.radau.systems import factorise_euler
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.error import end_of_run, rounding_error
 from flocsim.integrators.rhs.forces import copy_motion, sum_other_forces
@@ -176,7 +177,7 @@ def solve_change(scene, work, step):
     """Write Newton's change of the velocities to CHANGE; return the largest resulting displacement
     [m]."""
     write_residual(scene, work, step)
-    solve_real(work)
+    solve_blocks(work, False)
     work.tally.solves += 1
     largest = 0.0
     for body in range(work.poses.shape[0]):

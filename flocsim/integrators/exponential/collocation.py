@@ -32,7 +32,6 @@ from flocsim.integrators.radau.stages import (
     locate_state,
     update_stage_slips,
 )
-from flocsim.integrators.radau.systems import is_dense
 from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
 from flocsim.integrators.radau.tableau import NODES as RADAU
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
@@ -49,6 +48,7 @@ from flocsim.state.work import (
     DAMPING,
     FIRST_STAGE,
     FORCING,
+    MOST_IN_SERIES,
     MOTION,
     NOW,
     PROPAGATED,
@@ -238,7 +238,7 @@ def finish_step(scene, work, terms, step):
 
 def may_be_series(scene, work):
     """Return True if steps of these bodies can be series: few bodies, and inertia."""
-    return is_dense(work) and inertia(scene, 0, 0) != 0.0
+    return work.poses.shape[0] <= MOST_IN_SERIES and inertia(scene, 0, 0) != 0.0
 
 
 @apart

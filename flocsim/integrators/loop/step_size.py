@@ -22,12 +22,11 @@ from flocsim.integrators.events.first_event import (
 from flocsim.integrators.events.resolution import touch_resolution
 from flocsim.integrators.exponential.collocation import may_be_series
 from flocsim.integrators.loop.kicks import kick_end
-from flocsim.integrators.radau.systems import is_dense
 from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
 from flocsim.integrators.rhs.views import contact_view, inertia, normal_rate, velocity_lifetime_of
 from flocsim.state.clock import PLAIN, RADAU
 from flocsim.state.contacts import CLOSED
-from flocsim.state.work import NOW, STIFFNESS
+from flocsim.state.work import MOST_IN_SERIES, NOW, STIFFNESS
 
 SAFETY = 0.9
 """Fraction of the step at which the error would just meet the tolerance."""
@@ -240,7 +239,7 @@ def step_behind_touch(scene, work, clock):
         return math.inf
     frequency, allowed = math.sqrt(frequency_squared), TOUCH_ERROR_FRACTION * clock.tolerance
     # Solve the error of the step = tolerance for h; see TOUCH_ERROR_FRACTION.
-    if work.tally.kind == PLAIN or not is_dense(work):
+    if work.tally.kind == PLAIN or work.poses.shape[0] > MOST_IN_SERIES:
         return (allowed / displacement) ** 0.25 / frequency
     return (allowed * frequency / top_speed) ** 0.2 / frequency
 

@@ -1,4 +1,4 @@
-"""Sparse block LU factors for many bodies, in blocks of 3 × 3, by rows.
+"""Sparse block LU factors, in blocks of 3 × 3, by rows.
 
 The real and the complex system of a Newton iteration (systems.py) have one sparsity pattern
 (ordering.py). They are factorised together, or the real one alone: a block holds the real numbers,
@@ -11,8 +11,7 @@ Mutual forces cancel in these sums and are never written. Momentum is exact for 
 """
 
 from flocsim.compiler.linker import loops_apart
-from flocsim.hooks import hook
-from flocsim.integrators.radau.ordering import NONE, find_pattern, is_leader
+from flocsim.integrators.radau.ordering import NONE, find_pattern, is_edge, is_leader
 from flocsim.integrators.radau.tableau import COMPLEX, EIGENVALUES, REAL
 from flocsim.integrators.rhs.blocks import lower_block, own_block, upper_block
 from flocsim.integrators.rhs.views import inertia
@@ -115,7 +114,7 @@ def write_systems(scene, work, step, both):
             write_momentum(scene, work, body, weights, step, both)
     # Couplings of the pairs that act.
     for pair in range(work.tally.pairs):
-        if e.pairs[pair] == 1:
+        if is_edge(scene, work, pair):
             a, b = work.pairs[pair].later, work.pairs[pair].earlier
             write_coupling(work, a, b, lower_block(work, pair), weights, both)
             write_coupling(work, b, a, upper_block(work, pair), weights, both)
@@ -200,49 +199,71 @@ def divide_complex(e, slot):
             put_entry(e.blocks, block, i, j, a * x + b * y + c * z)
 
 
-def adjugate(a, b, c, d, e, f, g, h, i):
-    """Return the determinant of a 3 × 3 matrix, then its adjugate row by row."""
-    one, two, three = e * i - f * h, f * g - d * i, d * h - e * g
-    determinant = a * one + b * two + c * three
-    return (
-        determinant,
-        one, c * h - b * i, b * f - c * e,
-        two, a * i - c * g, c * d - a * f,
-        three, b * g - a * h, a * e - b * d,
-    )  # fmt: skip
+def number(blocks, which, block, i, j):
+    """Return an entry of a block of one of the systems, as a complex number."""
+    if which == REAL:
+        return complex(blocks[REAL_PART, block, i, j], 0.0)
+    return entry(blocks, block, i, j)
 
 
-def invert(blocks, block, both):
-    """Replace a diagonal block by its inverse, in the real system or in both; return False if
-    singular."""
-    adj = adjugate(
-        blocks[REAL_PART, block, 0, 0],
-        blocks[REAL_PART, block, 0, 1],
-        blocks[REAL_PART, block, 0, 2],
-        blocks[REAL_PART, block, 1, 0],
-        blocks[REAL_PART, block, 1, 1],
-        blocks[REAL_PART, block, 1, 2],
-        blocks[REAL_PART, block, 2, 0],
-        blocks[REAL_PART, block, 2, 1],
-        blocks[REAL_PART, block, 2, 2],
-    )
-    if not abs(adj[0]) > 0.0:
-        return False
-    reciprocal = 1.0 / adj[0]
-    for k in range(9):
-        blocks[REAL_PART, block, k // 3, k % 3] = reciprocal * adj[1 + k]
-    if not both:
-        return True
-    pair = adjugate(
-        entry(blocks, block, 0, 0), entry(blocks, block, 0, 1), entry(blocks, block, 0, 2),
-        entry(blocks, block, 1, 0), entry(blocks, block, 1, 1), entry(blocks, block, 1, 2),
-        entry(blocks, block, 2, 0), entry(blocks, block, 2, 1), entry(blocks, block, 2, 2),
-    )  # fmt: skip
-    if pair[0] == 0.0:
-        return False
-    part = 1.0 / pair[0]
-    for k in range(9):
-        put_entry(blocks, block, k // 3, k % 3, part * pair[1 + k])
+def put_number(blocks, which, block, i, j, value):
+    """Write an entry of a block of one of the systems."""
+    if which == REAL:
+        blocks[REAL_PART, block, i, j] = value.real
+    else:
+        put_entry(blocks, block, i, j, value)
+
+
+def pivot_row(blocks, which, block, column):
+    """Return the row, from the one of this number on, with the largest entry in a column."""
+    found, largest = column, -1.0
+    for row in range(column, 3):
+        value = number(blocks, which, block, row, column)
+        size = abs(value.real) + abs(value.imag)
+        if size > largest:
+            found, largest = row, size
+    return found
+
+
+def swap(blocks, which, block, i, j, k, l):
+    """Swap two entries of a block, (i, j) and (k, l)."""
+    value = number(blocks, which, block, i, j)
+    put_number(blocks, which, block, i, j, number(blocks, which, block, k, l))
+    put_number(blocks, which, block, k, l, value)
+
+
+def invert(blocks, which, block):
+    """Replace a diagonal block of a system by its inverse; return False if singular.
+
+    Gauss and Jordan's, in place, with row pivoting: stiff contacts leave less accuracy to others.
+    """
+    rows = 0
+    for k in range(3):
+        pivot = pivot_row(blocks, which, block, k)
+        rows = 4 * rows + pivot
+        for j in range(3):
+            swap(blocks, which, block, k, j, pivot, j)
+        value = number(blocks, which, block, k, k)
+        size = value.real * value.real + value.imag * value.imag
+        if not size > 0.0:
+            return False
+        reciprocal = complex(value.real / size, -value.imag / size)
+        put_number(blocks, which, block, k, k, complex(1.0, 0.0))
+        for j in range(3):
+            put_number(blocks, which, block, k, j, reciprocal * number(blocks, which, block, k, j))
+        for i in range(3):
+            if i != k:
+                factor = number(blocks, which, block, i, k)
+                put_number(blocks, which, block, i, k, complex(0.0, 0.0))
+                for j in range(3):
+                    rest = number(blocks, which, block, i, j)
+                    rest -= factor * number(blocks, which, block, k, j)
+                    put_number(blocks, which, block, i, j, rest)
+    # Swapped rows are swapped columns of the inverse.
+    for k in range(2, -1, -1):
+        for i in range(3):
+            swap(blocks, which, block, i, k, i, rows % 4)
+        rows //= 4
     return True
 
 
@@ -262,11 +283,13 @@ def factorise_row(e, row, both):
             add_row(e, slot, COMPLEX_RE, COMPLEX_IM, COMPLEX_IM, 1.0)
             add_row(e, slot, COMPLEX_IM, COMPLEX_RE, COMPLEX_IM, -1.0)
             add_row(e, slot, COMPLEX_IM, COMPLEX_IM, COMPLEX_RE, -1.0)
-    return invert(e.blocks, row, both)
+    for which in range(2 if both else 1):
+        if not invert(e.blocks, which, row):
+            return False
+    return True
 
 
-@hook
-def factorise_sparse(scene, work, step, both):
+def factorise_blocks(scene, work, step, both):
     """Write and factorise the real system, or both; return False if one is singular or lacks
     room."""
     if not find_pattern(scene, work):
@@ -331,8 +354,7 @@ def substitute_row(e, loads, index, first, last, both):
             subtract_complex(e, loads, block_of(e, slot), row, other)
 
 
-@hook
-def solve_sparse(work, both):
+def solve_blocks(work, both):
     """Replace the load of the real system, or of both, by the solution."""
     e, loads = work.elimination, work.loads
     n = work.poses.shape[0]

@@ -8,14 +8,13 @@ With A⁻¹ = T Λ T⁻¹ this decouples into one system for each eigenvalue µ 
 
     ((µ/h) M + D + (h/µ) K) δW = T⁻¹ r,  δV = T δW,
 
-in the frames of contact_frames.py. Systems of few bodies are dense (dense.py), those of many are
-sparse, in an order with little fill-in (elimination.py).
+in the frames of contact_frames.py. The systems are sparse, and eliminated in an order with little
+fill-in (elimination.py).
 """
 
 from flocsim.compiler.linker import apart
 from flocsim.integrators.radau.contact_frames import add_shifts, force_at_start, velocity_at_stage
-from flocsim.integrators.radau.dense import factorise_dense, solve_dense
-from flocsim.integrators.radau.elimination import factorise_sparse, solve_sparse
+from flocsim.integrators.radau.elimination import factorise_blocks, solve_blocks
 from flocsim.integrators.radau.tableau import (
     COMPLEX,
     EIGENVALUES,
@@ -26,62 +25,13 @@ from flocsim.integrators.radau.tableau import (
     THIRD_STAGE,
     TO_EIGENBASIS,
 )
-from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.views import inertia
 from flocsim.state.bodies import ANGLE, X, Y
-from flocsim.state.work import CHANGE, DAMPING, DENSE, FIRST_STAGE, NOW, STIFFNESS
-
-
-def is_dense(work):
-    """Return True if the systems are small enough for dense factors."""
-    return work.poses.shape[0] <= DENSE
-
-
-def write_dense_block(scene, work, which, step, block, body, other):
-    """Write a block of D + (h/µ) K to a dense system; rows of a fixed body stay zero."""
-    value, moves = EIGENVALUES[which], scene.bodies[body].free
-    for i in range(3):
-        for j in range(3):
-            entry = work.jacobian[DAMPING, block, i, j]
-            entry = entry + step / value * work.jacobian[STIFFNESS, block, i, j]
-            work.system[which, 3 * body + i, 3 * other + j] = moves * entry
-
-
-def write_dense_matrix(scene, work, which, step):
-    """Write (µ/h) M + D + (h/µ) K for one eigenvalue µ as a dense matrix."""
-    value = EIGENVALUES[which]
-    for body in range(work.poses.shape[0]):
-        write_dense_block(scene, work, which, step, body, body, body)
-        for axis in range(3):
-            # A fixed body gets the identity: its velocity stays zero.
-            row, mass = 3 * body + axis, inertia(scene, body, axis)
-            moves = scene.bodies[body].free
-            work.system[which, row, row] += value / step * mass if moves == 1.0 else 1.0
-    for pair in range(work.tally.pairs):
-        a, b = work.pairs[pair].later, work.pairs[pair].earlier
-        write_dense_block(scene, work, which, step, lower_block(work, pair), a, b)
-        write_dense_block(scene, work, which, step, upper_block(work, pair), b, a)
-    # Momentum is conserved to rounding by this change of equations.
-    sum_cluster_rows(work, which)
-
-
-def sum_cluster_rows(work, which):
-    """Replace the force balance of a cluster's first body by the momentum balance of the cluster.
-
-    Mutual forces cancel in the sum of rows. So rounding of the solution cannot change momentum.
-    """
-    for body in range(work.poses.shape[0]):
-        leader = work.cluster[body]
-        if leader != body:
-            for axis in range(2):
-                for column in range(work.system.shape[1]):
-                    entry = work.system[which, 3 * body + axis, column]
-                    work.system[which, 3 * leader + axis, column] += entry
+from flocsim.state.work import CHANGE, FIRST_STAGE, NOW
 
 
 def sum_cluster_loads(work, which):
-    """Sum the loads of each cluster into its first body's, as sum_cluster_rows does with the
-    rows."""
+    """Sum the loads of each cluster into its first body's, whose row is the momentum balance."""
     for body in range(work.poses.shape[0]):
         leader = work.cluster[body]
         if leader != body:
@@ -89,21 +39,9 @@ def sum_cluster_loads(work, which):
                 work.loads[which, 3 * leader + axis] += work.loads[which, 3 * body + axis]
 
 
-def write_and_factorise(scene, work, step, both):
-    """Write and factorise the real system, or both; return False if one is singular or lacks
-    room."""
-    if not is_dense(work):
-        return factorise_sparse(scene, work, step, both)
-    for which in range(2 if both else 1):
-        write_dense_matrix(scene, work, which, step)
-        if not factorise_dense(work.system, work.pivots, which):
-            return False
-    return True
-
-
 def factorise_systems(scene, work, step):
     """Write and factorise both systems; return False if one is singular or lacks room."""
-    return write_and_factorise(scene, work, step, True)
+    return factorise_blocks(scene, work, step, True)
 
 
 @apart
@@ -112,15 +50,7 @@ def factorise_euler(scene, work, step):
 
     It is Radau's real system for a step that is µ times as long.
     """
-    return write_and_factorise(scene, work, EIGENVALUES[REAL].real * step, False)
-
-
-def solve_real(work):
-    """Replace the load of the real system by the solution."""
-    if is_dense(work):
-        solve_dense(work.system, work.pivots, work.loads, REAL)
-    else:
-        solve_sparse(work, False)
+    return factorise_blocks(scene, work, EIGENVALUES[REAL].real * step, False)
 
 
 def prepare_load(scene, work):
@@ -134,16 +64,12 @@ def prepare_load(scene, work):
 def solve_prepared(scene, work):
     """Solve the real system for its load, after prepare_load."""
     prepare_load(scene, work)
-    solve_real(work)
+    solve_blocks(work, False)
 
 
 def solve_both(work):
     """Replace the loads of both systems by the solutions."""
-    if is_dense(work):
-        for which in range(2):
-            solve_dense(work.system, work.pivots, work.loads, which)
-    else:
-        solve_sparse(work, True)
+    solve_blocks(work, True)
 
 
 def momentum_rate(scene, work, body, axis, stage, step):
