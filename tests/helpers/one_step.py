@@ -4,35 +4,27 @@ from flocsim import System
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import BackwardEuler
-from flocsim.integrators.backward_euler.contact_mean import flag_close
-from flocsim.integrators.backward_euler.newton import begin_step, evaluate_other_forces
-from flocsim.integrators.backward_euler.path import search_cold, typical_sizes
+from flocsim.integrators.backward_euler.newton import begin_step
 from flocsim.integrators.backward_euler.step import euler_step, solve_step
 from flocsim.integrators.loop.driver import accept, keep_lists, went_too_far
-from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.state.work import NOW, work_of
 
 
-def from_before(scene, work, clock, step):
-    """One step from contacts as they are at its start, or else from anywhere."""
+def find_end(scene, work, clock, step):
+    """The end of one step."""
     begin_step(work, clock)
     return solve_step(scene, work, clock, step)
 
 
-def from_anywhere(scene, work, clock, step):
-    """One step of whose contacts nothing is known."""
-    begin_step(work, clock)
-    evaluate_other_forces(scene, work, clock.time, step)
-    flag_close(scene, work)
-    gather_clusters(scene, work)
-    usual, way = typical_sizes(scene, work, step)
-    return search_cold(scene, work, clock, step, usual, way)
-
-
 def whole_step(scene, work, clock, counts, step):
-    """One step, however large its error: that over the tolerance."""
+    """One step, however large its error: that over the tolerance; a smaller one where no end is
+    found, as a run has it."""
     ratio, _ = euler_step(scene, work, clock, step, False)
-    assert ratio >= 0.0 and not went_too_far(scene, work, clock, step)
+    while ratio < 0.0:
+        assert step > 1e-9
+        step *= 0.5
+        ratio, _ = euler_step(scene, work, clock, step, False)
+    assert not went_too_far(scene, work, clock, step)
     accept(scene, work, clock, counts, step, True)
     return ratio
 
@@ -55,9 +47,9 @@ class Stage:
         """The function with this family's others in the place of hooks."""
         return compose(function, self.fillings, jit=False)
 
-    def end(self, step, how=from_before):
+    def end(self, step):
         """Whether the step's end was found; it is left in NOW."""
-        return self.linked(how)(self.scene, self.work, self.clock, step)
+        return self.linked(find_end)(self.scene, self.work, self.clock, step)
 
     def step(self, step):
         """Take a step, however large its error: that over the tolerance."""

@@ -22,14 +22,12 @@ p and q follow L. Where L was changed between iterations only, half of the searc
 polygons failed.
 
 With L(δ) the systems are not symmetric, and may lead to no solution (a contact wedged between
-sliding ones): the iterations then make ever shorter steps, the search is given up, and the step
-repeated with a smaller size.
+sliding ones): the search is given up, and the step repeated with a smaller size.
 
-The length of an iteration is limited by the contact that would first leave its domain, and among
-hundreds there is always one. So near a solution each contact makes a step of its own, and the
-bodies make a full one (`change_pairs`). Contacts then do not fit their gaps, as in an infeasible
-start (Wright, chapter 6), and the next iteration mends this. It takes a third of the systems, or
-diverges, which shows within four iterations. A search begins and ends like that.
+The length of an iteration would be limited by the contact that first leaves its domain, and among
+hundreds there is always one. So each contact makes a step of its own, and the bodies make a full
+one (`change_pairs`). Contacts then do not fit their gaps, as in an infeasible start (Wright,
+chapter 6), and the next iteration mends this. It takes a third of the systems.
 
 Before the end, a contact with a friction limit that was closed at the start counts as closed for
 the whole step. Its s would follow the gap, which is far from its final value, and friction would
@@ -92,12 +90,10 @@ def closed_part_slopes(work, row, limited):
     return faded / (faded + slack), slack / (faded + slack) ** 2, faded / (faded + slack) ** 2
 
 
-def evaluate_law(scene, work, row, step, turns):
+def evaluate_law(scene, work, row, step):
     """Return N of a pair for the overlap δ [N], and dN/dδ [N/m]; write its friction law.
 
-    The friction law goes to ``work.interior``; its limit is 0 where there is none. Along frozen
-    gaps (``turns`` False) springs alone limit friction, which is smooth: with the dashpots, N is
-    clipped at 0, and the kink costs a third more systems.
+    The friction law goes to ``work.interior``; its limit is 0 where there is none.
     """
     contact = work.interior[row]
     overlap, rate = contact.overlap, tangential_rate(work, NOW, row)
@@ -115,10 +111,8 @@ def evaluate_law(scene, work, row, step, turns):
         slip_cut = slip_limit(scene, friction_view)
         if 0.0 < slip_cut < math.inf:
             spring, dashpot = sticking_slopes(scene, friction_view, slip_cut, step)
-            limit = spring * slip_cut
-            if turns:
-                limit_view = step_view(scene, work, row, step, overlap, slip_cut, abs(rate))
-                limit = max(-contact_force(scene, limit_view)[1], MIN_LIMIT * limit)
+            limit_view = step_view(scene, work, row, step, overlap, slip_cut, abs(rate))
+            limit = max(-contact_force(scene, limit_view)[1], MIN_LIMIT * spring * slip_cut)
             limit /= hardness
     # e = k_t (ξ₀ + s h v_t) + damping, over the normal stiffness.
     contact.closed_fraction, _, _ = closed_part_slopes(work, row, limit > 0.0)
@@ -202,17 +196,13 @@ def unlimited_friction(scene, work, row, step, target):
 
 
 @apart
-def write_forces(scene, work, step, target, turns):
-    """Add the linearised forces, and their derivatives, of all contacts to forces and system.
-
-    ``turns``: with the derivatives of rotation. Before contacts fit their gaps these are too large,
-    and may make the system indefinite.
-    """
+def write_forces(scene, work, step, target):
+    """Add the linearised forces, and their derivatives, of all contacts to forces and system."""
     for row in range(work.tally.candidates):
         if is_included(work, row):
             contact = work.interior[row]
             overlap, slack = contact.overlap, contact.slack
-            normal, stiffness = evaluate_law(scene, work, row, step, turns)
+            normal, stiffness = evaluate_law(scene, work, row, step)
             # Eliminate dδ and df: what remains depends on gap and v_t, that is, on the velocities.
             normal += stiffness * overlap_correction(work, row, target)
             tangential, slope, coupled = 0.0, 0.0, 0.0
@@ -224,8 +214,7 @@ def write_forces(scene, work, step, target, turns):
             # Only the fraction δ/(δ + s) of the stiffness resists a change of the gap.
             stiffness *= overlap / (overlap + slack)
             add_contact_slopes(scene, work, row, stiffness, slope, coupled)
-            if turns:
-                add_geometric_stiffness(scene, work, row, normal, tangential)
+            add_geometric_stiffness(scene, work, row, normal, tangential)
 
 
 def keep_positive(fraction, size, change):
@@ -295,24 +284,16 @@ def change_pair(work, row, step, target, fraction, apply):
 
 
 @apart
-def change_pairs(work, step, target, own):
-    """Change all contacts along with the velocities in CHANGE; return the smallest fraction.
-
-    All contacts go the smallest fraction, or each its ``own`` one.
-    """
-    fraction = 1.0
+def change_pairs(work, step, target):
+    """Change all contacts along with the velocities in CHANGE, each by the largest fraction that
+    keeps it in its domain; return the smallest fraction."""
+    least = 1.0
     for row in range(work.tally.candidates):
         if is_included(work, row):
-            fraction_own = change_pair(work, row, step, target, 1.0, False)
-            if own:
-                change_pair(work, row, step, target, fraction_own, True)
-            fraction = min(fraction, fraction_own)
-    if not own:
-        # A common fraction keeps contacts and gaps consistent.
-        for row in range(work.tally.candidates):
-            if is_included(work, row):
-                change_pair(work, row, step, target, fraction, True)
-    return fraction
+            fraction = change_pair(work, row, step, target, 1.0, False)
+            change_pair(work, row, step, target, fraction, True)
+            least = min(least, fraction)
+    return least
 
 
 @apart

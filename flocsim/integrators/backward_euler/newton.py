@@ -192,11 +192,11 @@ def solve_change(scene, work, step):
     return largest
 
 
-def apply_change(work, fraction):
-    """Add a fraction of the change to the velocities."""
+def apply_change(work):
+    """Add the change to the velocities."""
     for body in range(work.poses.shape[0]):
         for axis in range(3):
-            work.velocity[NOW, body, axis] += fraction * work.velocity[CHANGE, body, axis]
+            work.velocity[NOW, body, axis] += work.velocity[CHANGE, body, axis]
 
 
 def final_tolerance(scene, work, clock, step):
@@ -219,7 +219,7 @@ def solve_end(scene, work, clock, step):
         change = solve_change(scene, work, step)
         if not change < math.inf:
             return False
-        apply_change(work, 1.0)
+        apply_change(work)
         # Newton converges quadratically here: the change after this one is negligible.
         if change <= final_tolerance(scene, work, clock, step):
             return evaluate_end(scene, work, clock.time, step)

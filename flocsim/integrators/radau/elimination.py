@@ -225,11 +225,11 @@ def pivot_row(blocks, which, block, column):
     return found
 
 
-def swap(blocks, which, block, i, j, k, l):
-    """Swap two entries of a block, (i, j) and (k, l)."""
+def swap(blocks, which, block, i, j, row, column):
+    """Swap two entries of a block, (i, j) and (row, column)."""
     value = number(blocks, which, block, i, j)
-    put_number(blocks, which, block, i, j, number(blocks, which, block, k, l))
-    put_number(blocks, which, block, k, l, value)
+    put_number(blocks, which, block, i, j, number(blocks, which, block, row, column))
+    put_number(blocks, which, block, row, column, value)
 
 
 def invert(blocks, which, block):
