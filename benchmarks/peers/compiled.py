@@ -14,8 +14,8 @@ from flocsim.geometry.contact.candidates import (
 )
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import observe
+from flocsim.integrators.events.crossings import any_too_deep
 from flocsim.integrators.events.first_event import set_modes
-from flocsim.integrators.loop.driver import any_too_deep
 from flocsim.integrators.rhs.forces import locate_with_slip_rates, sum_forces
 from flocsim.integrators.rhs.views import inertia
 from flocsim.state.work import NOW
@@ -89,4 +89,4 @@ def inspect(scene, work, observed, time, vector, watch):
     for row in range(work.tally.candidates):
         opened = opened or (work.candidates[row].contact_mode == 0 and work.slip[NOW, row] != 0.0)
     code = observe(scene, work, observed, time) if watch else 0
-    return spent_budget(scene, work, NOW), opened, least, any_too_deep(scene, work), code
+    return spent_budget(scene, work, NOW), opened, least, any_too_deep(scene, work, NOW), code

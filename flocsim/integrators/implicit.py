@@ -72,7 +72,7 @@ def solve_as_series(scene, work, clock, step, known):
     if work.tally.series_terms == 0:
         return -1.0
     work.tally.kind = SERIES
-    estimate_series_error(scene, work, clock, step)
+    estimate_series_error(work, clock, step)
     return error_ratio(scene, work, clock, step)
 
 

@@ -15,6 +15,7 @@ class Tally(Record):
     full: int  # which array has no room left, see NOTHING_FULL
     kind: int  # of the last step tried: PLAIN, SERIES or RADAU
     series_terms: int  # terms of its series in ``Work.series``, if it was one
+    series_step: float  # size of the step of that series, which may have ended earlier [s]
     smooth_gap: float  # last smooth gap evaluated (rhs.surface_gap) [m]
 
 
@@ -67,7 +68,6 @@ class Clock(Record):
     stages_time: float  # time at which that step began [s]
     # Motion as a power series.
     longest_series: float  # longest step for which the series converges; inf: not known [s]
-    series_step: float  # size of the step of the series in ``Work.series`` [s]
     series_norm: float  # bound of ω h in that step, ω being its highest frequency
     # Backward Euler, whose steps pass over switches.
     across: float  # 1 if steps pass over switches, 0 if they end at them

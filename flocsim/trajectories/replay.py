@@ -21,7 +21,7 @@ from flocsim.geometry.contact.points import contact_point, locate_contacts
 from flocsim.hooks import CONTACT_FORCE, contact_force, has, law_table
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.first_event import set_closed
-from flocsim.integrators.exponential.series import evaluate_at
+from flocsim.integrators.exponential.series import evaluate_all
 from flocsim.integrators.implicit import Implicit, Overdamped
 from flocsim.integrators.radau.collocation import interpolate, stage_weights
 from flocsim.integrators.radau.tableau import SECOND_STAGE, THIRD_STAGE
@@ -33,6 +33,7 @@ from flocsim.state.clock import NEVER, RADAU, SERIES
 from flocsim.state.scene import NO_WATER, Scene
 from flocsim.state.work import (
     FIRST_STAGE,
+    MOTION,
     NOW,
     START,
     TRIAL,
@@ -224,9 +225,8 @@ def step_motion(run: Run, start: np.ndarray, begin: float, end: float, time: flo
     """
     work, clock = run.work, run.clock
     if work.tally.kind == SERIES and np.array_equal(motion_of(work, START), start):
-        whole = float(clock.series_step)
-        terms = int(work.tally.series_terms)
-        evaluate_at(work, START, terms, whole, (time - begin) / whole, TRIAL, 0, len(start))
+        whole, terms = float(work.tally.series_step), int(work.tally.series_terms)
+        evaluate_all(work, MOTION, START, terms, whole, (time - begin) / whole, TRIAL)
         return motion_of(work, TRIAL)
     stages = np.array(
         [motion_of(work, each) for each in (START, FIRST_STAGE, SECOND_STAGE, THIRD_STAGE)]

@@ -54,10 +54,14 @@ def margin_rate(work, state, row):
     return -rate if work.geometry[NOW, row].gap < 0.0 else rate
 
 
-def is_too_deep(scene, work, state, row):
-    """Return True if a listed pair overlaps past the limit of the contact law."""
-    radius_a, radius_b = work.candidates[row].vertex_radius, work.candidates[row].edge_radius
-    return -work.geometry[state, row].gap > DEEPEST_OVERLAP * (radius_a + radius_b)
+def any_too_deep(scene, work, state):
+    """Return True if a closed pair overlaps past the limit of the contact law in a state."""
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        limit = DEEPEST_OVERLAP * (candidate.vertex_radius + candidate.edge_radius)
+        if candidate.contact_mode == CLOSED and -work.geometry[state, row].gap > limit:
+            return True
+    return False
 
 
 def margin_at(scene, work, step, share, row):
@@ -70,17 +74,24 @@ def margin_at(scene, work, step, share, row):
     return margin(work, TRIAL, row)
 
 
+def may_dip(at_start, start_rate, at_end, end_rate):
+    """Return True if a margin may be below zero inside an interval though it is not at its ends.
+
+    ``start_rate`` and ``end_rate`` are its changes over the interval at the rates of both ends [m].
+    """
+    # A minimum inside needs a margin that falls at the start and rises at the end; the tangents at
+    # both ends bound a convex margin from below.
+    falls_and_rises = start_rate < 0.0 < end_rate
+    return falls_and_rises and min(at_start + 0.5 * start_rate, at_end - 0.5 * end_rate) <= 0.0
+
+
 def may_dip_below(work, step, row, level):
     """Return True if the margin may be below a level [m] inside the step though it is not at its
     ends."""
-    # A minimum inside needs a margin that falls at the start and rises at the end.
-    rate_low = step * margin_rate(work, NOW, row)
-    rate_high = step * margin_rate(work, NEW, row)
-    if not rate_low < 0.0 < rate_high:
-        return False
-    # The tangents at both ends bound a convex margin from below.
-    at_start, at_end = margin(work, NOW, row) - level, margin(work, NEW, row) - level
-    return not (at_start + rate_low * 0.5 > 0.0 and at_end - rate_high * 0.5 > 0.0)
+    return may_dip(
+        margin(work, NOW, row) - level, step * margin_rate(work, NOW, row),
+        margin(work, NEW, row) - level, step * margin_rate(work, NEW, row),
+    )  # fmt: skip
 
 
 def relative_speed_bound(scene, work, state, row):
@@ -93,7 +104,30 @@ def relative_speed_bound(scene, work, state, row):
     return speed + abs(work.velocity[state, b, ANGLE]) * scene.bodies[b].bounding_radius
 
 
-def share_of_minimum(scene, work, step, row, level):
+def share_of_minimum(scene, work, step, row, low, high, rate_low, rate_high):
+    """Return the fraction of the step at which the margin is least, and locate the pair there in
+    TRIAL.
+
+    Between the fractions ``low``, where the margin falls, and ``high``, where it rises, at these
+    rates.
+    """
+    share = high
+    for _ in range(8):
+        # Regula falsi on the rate, kept away from the ends of the bracket.
+        share = (low * rate_high - high * rate_low) / (rate_high - rate_low)
+        share = min(max(share, 0.9 * low + 0.1 * high), 0.1 * low + 0.9 * high)
+        margin_at(scene, work, step, share, row)
+        rate = margin_rate(work, TRIAL, row)
+        if rate < 0.0:
+            low, rate_low = share, rate
+        else:
+            high, rate_high = share, rate
+        if step * abs(rate) * (high - low) < 1e-15:
+            break
+    return share
+
+
+def share_of_dip(scene, work, step, row, level):
     """Return the fraction of the step at which the margin is least, and locate the pair there in
     TRIAL.
 
@@ -101,23 +135,8 @@ def share_of_minimum(scene, work, step, row, level):
     """
     if not may_dip_below(work, step, row, level):
         return NEVER
-    low, high = 0.0, 1.0
-    rate_low = step * margin_rate(work, NOW, row)
-    rate_high = step * margin_rate(work, NEW, row)
-    share = 0.5
-    for _ in range(8):
-        # Regula falsi on the rate, kept away from the ends of the bracket.
-        share = (low * rate_high - high * rate_low) / (rate_high - rate_low)
-        share = min(max(share, 0.9 * low + 0.1 * high), 0.1 * low + 0.9 * high)
-        margin_at(scene, work, step, share, row)
-        rate = step * margin_rate(work, TRIAL, row)
-        if rate < 0.0:
-            low, rate_low = share, rate
-        else:
-            high, rate_high = share, rate
-        if abs(rate) * (high - low) < 1e-15:
-            break
-    return share
+    rates = margin_rate(work, NOW, row), margin_rate(work, NEW, row)
+    return share_of_minimum(scene, work, step, row, 0.0, 1.0, rates[0], rates[1])
 
 
 def locate_crossing(scene, work, step, row, high, at_high, resolution):
@@ -182,7 +201,7 @@ def earlier_switch(scene, work, step, row, earliest, resolution, depth):
     resolution = min(resolution, limit)
     # No switch at the end of the step: look for one that comes and goes within it.
     if margin(work, NEW, row) >= -limit:
-        lowest = share_of_minimum(scene, work, step, row, 0.0)
+        lowest = share_of_dip(scene, work, step, row, 0.0)
         if lowest > high:
             return earliest
         high = lowest
@@ -217,7 +236,7 @@ def passes_through_reach(scene, work, step, depth):
     for row in range(work.tally.candidates):
         if (
             min(g[NOW, row].gap, g[NEW, row].gap) > reach
-            and share_of_minimum(scene, work, step, row, reach) < 1.0
+            and share_of_dip(scene, work, step, row, reach) < 1.0
             and g[TRIAL, row].gap < reach - depth
         ):
             return True

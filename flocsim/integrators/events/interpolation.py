@@ -1,15 +1,16 @@
 """Motion inside a step, as far as the kind of the step tells it (flocsim.state.clock: PLAIN)."""
 
-from flocsim.integrators.exponential.series import evaluate_at
+from flocsim.integrators.exponential.series import evaluate_all, evaluate_body
 from flocsim.integrators.radau.collocation import end_on_cubic, interpolate_stages
 from flocsim.state.clock import RADAU, SERIES
-from flocsim.state.work import NEW, NOW, START, TRIAL
+from flocsim.state.work import MOTION, NEW, NOW, START, TRIAL
 
 
 def interpolate(work, step, share, body):
     """Write a body's motion at a fraction of the step to TRIAL (dense output)."""
     if work.tally.kind == SERIES:
-        evaluate_at(work, START, work.tally.series_terms, step, share, TRIAL, body, body + 1)
+        whole, terms = work.tally.series_step, work.tally.series_terms
+        evaluate_body(work, MOTION, START, terms, whole, share * step / whole, TRIAL, body)
     elif work.tally.kind == RADAU:
         interpolate_stages(work, share, body)
     else:
@@ -41,7 +42,7 @@ def end_within(scene, work, step, ratio, share):
     """
     if work.tally.kind == SERIES:
         # A series is as accurate inside the step as at its end.
-        terms, bodies = work.tally.series_terms, work.place.shape[1]
-        evaluate_at(work, START, terms, step, share, NEW, 0, bodies)
+        whole, terms = work.tally.series_step, work.tally.series_terms
+        evaluate_all(work, MOTION, START, terms, whole, share * step / whole, NEW)
         return True
     return work.tally.kind == RADAU and end_on_cubic(scene, work, step, ratio, share)

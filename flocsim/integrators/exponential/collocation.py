@@ -20,11 +20,12 @@ from flocsim.compiler.linker import apart
 from flocsim.constants import TINY
 from flocsim.integrators.exponential.series import (
     MAX_STIFFNESS,
-    add_change,
-    clear_change,
-    evaluate_at,
-    evaluate_change,
+    TERM_TOLERANCE,
+    evaluate_all,
     expand,
+    phase_bound,
+    write_first_terms,
+    write_terms,
 )
 from flocsim.integrators.radau.stages import (
     change_of_contacts,
@@ -32,14 +33,7 @@ from flocsim.integrators.radau.stages import (
     locate_state,
     update_stage_slips,
 )
-from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
-from flocsim.integrators.radau.tableau import NODES as RADAU
-from flocsim.integrators.rhs.blocks import lower_block, upper_block
-from flocsim.integrators.rhs.error import (
-    largest_error,
-    rounding_error,
-    step_tolerance,
-)
+from flocsim.integrators.rhs.error import rounding_error, step_tolerance
 from flocsim.integrators.rhs.forces import adopt_stage, copy_motion, sum_forces
 from flocsim.integrators.rhs.views import inertia, lever
 from flocsim.state.work import (
@@ -78,10 +72,6 @@ ITERATION_TOLERANCE = 1e-2
 """Error that the iteration may leave, as a fraction of the step's tolerance. With .05 the errors of
 consecutive steps have one sign, and runs become ten times less accurate."""
 
-RADAU_ERROR_RATIO, LONGEST_SERIES_GROWTH = 0.5, 2.0
-"""Steps may become too long for a series only if Radau IIA would have at most this error over the
-tolerance; then the limit of the series is raised by the second factor at once."""
-
 NO_SWING_PHASE = 1.0
 """Phase h ω [rad] of the fastest vibration below which nothing oscillates in a step: its path has
 one direction."""
@@ -107,32 +97,21 @@ def extrapolate_remainder(work, clock, step, known):
             remainder[MOTION, 3, body, axis] = third * scale * scale * scale
 
 
-def subtract_linear(work, stage, block, body, other):
-    """Subtract the linear part of the force that another body's motion exerts on a body, in
-    CHANGE."""
-    jacobian = work.jacobian
-    for i in range(3):
-        total = work.velocity[CHANGE, body, i]
-        for j in range(3):
-            moved = work.place[stage, other, j] - work.place[NOW, other, j]
-            faster = work.velocity[stage, other, j] - work.velocity[NOW, other, j]
-            total += jacobian[STIFFNESS, block, i, j] * moved
-            total += jacobian[DAMPING, block, i, j] * faster
-        work.velocity[CHANGE, body, i] = total
-
-
-def write_remainder(work, stage):
-    """Write R at a point to the velocity part of CHANGE."""
+def write_changes(work, stage, step, fraction):
+    """Replace the forces at a point, which are no longer needed, by the changes of R there: R by
+    these forces, less R as it is."""
+    linear = work.linear
     for body in range(work.place.shape[1]):
-        for axis in range(3):
-            # F − F₀, minus the linear part with its sign: K and D are minus the derivatives.
-            force = work.force[stage, body, axis] - work.force[NOW, body, axis]
-            work.velocity[CHANGE, body, axis] = force
-        subtract_linear(work, stage, body, body, body)
-    for pair in range(work.tally.pairs):
-        later, earlier = work.pairs[pair].later, work.pairs[pair].earlier
-        subtract_linear(work, stage, lower_block(work, pair), later, earlier)
-        subtract_linear(work, stage, upper_block(work, pair), earlier, later)
+        for i in range(3):
+            change = work.force[stage, body, i] - work.force[NOW, body, i]
+            for other in range(work.place.shape[1]):
+                for j in range(3):
+                    # Minus the linear part with its sign: K and D are minus the derivatives.
+                    moved = work.place[stage, other, j] - work.place[NOW, other, j]
+                    faster = work.velocity[stage, other, j] - work.velocity[NOW, other, j]
+                    change += linear[STIFFNESS, body, other, i, j] * moved
+                    change += linear[DAMPING, body, other, i, j] * step * faster
+            work.force[stage, body, i] = change - remainder_at(work, fraction, body, i)
 
 
 def effect_of_change(scene, work, step, stage, goal):
@@ -158,8 +137,7 @@ def effect_of_change(scene, work, step, stage, goal):
 
 
 def add_cubic_to_remainder(work, body, axis, one, two, three):
-    """Add to R the cubic that is 0 at 0 and has three given values at the points; store it as
-    CHANGED."""
+    """Add to R the cubic that is 0 at 0 and has three given values at the points."""
     # Divided differences of value/θ, which is a parabola; then its coefficients.
     by_one, by_two = one / NODES[0], two / NODES[1]
     first = (by_two - by_one) / (NODES[1] - NODES[0])
@@ -168,9 +146,6 @@ def add_cubic_to_remainder(work, body, axis, one, two, three):
     square = first - third * (NODES[0] + NODES[1])
     linear = by_one - NODES[0] * (square + NODES[0] * third)
     remainder = work.remainder
-    remainder[CHANGED, 1, body, axis] = linear
-    remainder[CHANGED, 2, body, axis] = square
-    remainder[CHANGED, 3, body, axis] = third
     remainder[MOTION, 1, body, axis] += linear
     remainder[MOTION, 2, body, axis] += square
     remainder[MOTION, 3, body, axis] += third
@@ -197,18 +172,11 @@ def iterate_once(scene, work, time, terms, step, goal):
     """Correct R by the motion that it causes; return the effect of the correction [m]."""
     # Motion and forces at the three points.
     for stage in range(3):
-        evaluate_all_at(work, terms, step, NODES[stage], FIRST_STAGE + stage)
+        evaluate_all(work, MOTION, NOW, terms, step, NODES[stage], FIRST_STAGE + stage)
     evaluate_points(scene, work, time, step)
     largest = 0.0
-    # Replace the force at each point, which is no longer needed, by the change of R there.
     for stage in range(3):
-        write_remainder(work, FIRST_STAGE + stage)
-        for body in range(work.place.shape[1]):
-            for axis in range(3):
-                change = work.velocity[CHANGE, body, axis]
-                change -= remainder_at(work, NODES[stage], body, axis)
-                # The force at the point is not needed any more.
-                work.force[FIRST_STAGE + stage, body, axis] = change
+        write_changes(work, FIRST_STAGE + stage, step, NODES[stage])
     # Measure the change, then add it to R.
     for stage in range(3):
         largest = max(largest, effect_of_change(scene, work, step, stage, goal))
@@ -222,15 +190,11 @@ def iterate_once(scene, work, time, terms, step, goal):
     return largest
 
 
-def evaluate_all_at(work, terms, step, fraction, state):
-    evaluate_at(work, NOW, terms, step, fraction, state, 0, work.place.shape[1])
-
-
 def finish_step(scene, work, terms, step):
     """Write the end of the step to NEW, with tangential displacements; store its start in START."""
     copy_motion(work, NOW, START)
     last = FIRST_STAGE + 2
-    evaluate_all_at(work, terms, step, 1.0, last)
+    evaluate_all(work, MOTION, NOW, terms, step, 1.0, last)
     locate_state(scene, work, last)
     update_stage_slips(scene, work, step, 2, MATRIX)
     adopt_stage(work, last)
@@ -259,7 +223,9 @@ def solve_series(scene, work, clock, step, known):
     # First guess: the motion by the extrapolated R.
     extrapolate_remainder(work, clock, step, known)
     predicted, before = expected_rate(clock, step), math.inf
-    terms = expand(scene, work, clock, step, allowed)
+    write_first_terms(scene, work, step)
+    clock.series_norm = phase_bound(work)
+    terms = expand(work, clock, step, allowed)
     if terms > 0:
         # From here on the stages of Radau are overwritten.
         clock.stages_step = 0.0
@@ -274,11 +240,11 @@ def solve_series(scene, work, clock, step, known):
         rate = predicted if before == math.inf else change / before
         if not (change < math.inf and rate < 1.0):
             break
-        terms = add_change(work, terms, step, allowed)
+        terms = expand(work, clock, step, allowed)
         if terms > 0 and change * rate <= goal * (1.0 - rate):
             finish_step(scene, work, terms, step)
             clock.stages_step, clock.stages_time = step, clock.time
-            clock.series_step = step
+            work.tally.series_step = step
             clock.convergence_rate = 0.0 if before == math.inf else rate
             if before < math.inf:
                 clock.second_iteration_rate, clock.second_iteration_step = rate, step
@@ -288,47 +254,23 @@ def solve_series(scene, work, clock, step, known):
     return 0
 
 
-def error_of_radau(scene, work, terms, step):
-    """Return the error that Radau IIA would estimate for this motion [m].
-
-    By its embedded estimate (radau/estimate.py) of the power series, without the part that contacts
-    damp.
-    """
-    series = work.series
-    for body in range(work.place.shape[1]):
-        for axis in range(3):
-            work.place[STEP_ERROR, body, axis] = 0.0
-            work.velocity[STEP_ERROR, body, axis] = 0.0
-    # The estimate vanishes for powers below 4 of θ, being of order 3.
-    before, damped = 0.0, step / EIGENVALUES[REAL].real
-    one, two = RADAU[0] ** 3, RADAU[1] ** 3
-    for k in range(4, terms):
-        one, two = one * RADAU[0], two * RADAU[1]
-        # Estimate of θ^k. Velocities have the power k − 1, whose estimate is that of the last turn.
-        here = (ESTIMATE[0] * one + ESTIMATE[1] * two + ESTIMATE[2]) / step
-        for body in range(work.place.shape[1]):
-            for axis in range(3):
-                term = damped * series[MOTION, k, body, axis]
-                work.place[STEP_ERROR, body, axis] += here * term
-                work.velocity[STEP_ERROR, body, axis] += before * k / step * term
-        before = here
-    return largest_error(scene, work)
-
-
-def write_estimate(work, step):
+def write_estimate(work, step, goal):
     """Write the effect of leaving out the second Lobatto point to STEP_ERROR: the embedded
-    estimate."""
+    estimate, to ``goal`` [m]."""
     remainder = work.remainder
     for body in range(work.place.shape[1]):
         for axis in range(3):
             # Cubic minus parabola without that point: r₃ θ (θ − c₁)(θ − 1).
             cubic = remainder[MOTION, 3, body, axis]
-            remainder[CHANGED, 0, body, axis] = 0.0
             remainder[CHANGED, 1, body, axis] = NODES[0] * cubic
             remainder[CHANGED, 2, body, axis] = -(1.0 + NODES[0]) * cubic
             remainder[CHANGED, 3, body, axis] = cubic
-    clear_change(work)
-    evaluate_change(work, 1, step, 1.0, STEP_ERROR)
+            # It begins with term 3.
+            for k in range(3):
+                work.series[CHANGED, k, body, axis] = 0.0
+            work.place[STEP_ERROR, body, axis] = work.velocity[STEP_ERROR, body, axis] = 0.0
+    terms, _, _, _ = write_terms(work, CHANGED, 1, step, goal)
+    evaluate_all(work, CHANGED, STEP_ERROR, terms, step, 1.0, STEP_ERROR)
 
 
 def add_last_term(work, step):
@@ -342,17 +284,9 @@ def add_last_term(work, step):
 
 
 @apart
-def estimate_series_error(scene, work, clock, step):
-    """Estimate the error of the step, to STEP_ERROR; raise the limit of series where Radau would
-    do."""
-    # Its error scales as h⁴. Where it would be small at the longest series, longer steps may be
-    # Radau's.
-    growth = clock.longest_series / step
-    if growth < math.inf:
-        error = error_of_radau(scene, work, work.tally.series_terms, step)
-        if error * growth**4 <= RADAU_ERROR_RATIO * step_tolerance(work, clock):
-            clock.longest_series *= LONGEST_SERIES_GROWTH
-    write_estimate(work, step)
+def estimate_series_error(work, clock, step):
+    """Estimate the error of the step, to STEP_ERROR."""
+    write_estimate(work, step, TERM_TOLERANCE * step_tolerance(work, clock))
     add_last_term(work, step)
 
 
@@ -411,13 +345,14 @@ def propagate_with_series(work, clock, step, fraction):
     approach, their attraction steepens within a step, and an error of the arrival time grows like
     the speed. So R is included as far as the error lies along the path.
     """
-    write_error_terms(work, step, 0.0, 0.0)
-    evaluate_change(work, 0, step, fraction, CHANGE)
-    if nothing_swings(clock):
-        # δθ at the end depends on the result: two iterations.
-        for _ in range(2):
-            start, end = error_ratios_along_path(work, fraction)
-            if start == 0.0 and end == 0.0:
-                return
-            write_error_terms(work, step, start, start + (end - start) / fraction)
-            evaluate_change(work, 0, step, fraction, CHANGE)
+    start, end, goal = 0.0, 0.0, TERM_TOLERANCE * step_tolerance(work, clock)
+    # δθ at the end depends on the result: two more iterations.
+    for _ in range(3):
+        write_error_terms(work, step, start, start + (end - start) / fraction)
+        terms, _, _, _ = write_terms(work, CHANGED, 0, step, goal)
+        evaluate_all(work, CHANGED, PROPAGATED, terms, step, fraction, CHANGE)
+        if not nothing_swings(clock):
+            return
+        start, end = error_ratios_along_path(work, fraction)
+        if start == 0.0 and end == 0.0:
+            return

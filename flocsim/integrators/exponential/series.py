@@ -13,15 +13,10 @@ import math
 
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.views import inertia, lever
-from flocsim.state.work import CHANGED, DAMPING, LEVER, MOTION, MOVED, NOW, STIFFNESS, TERMS
+from flocsim.state.work import DAMPING, LEVER, MOTION, MOVED, NOW, STIFFNESS, TERMS
 
 TERM_TOLERANCE = 1e-3
-"""The series of a motion ends after two consecutive terms below this fraction of the step's
-tolerance."""
-
-ERROR_TERM_TOLERANCE = 0.01
-"""The series of an error, which is needed to a few digits only, ends after two consecutive terms
-below this fraction of its largest term."""
+"""A series ends after two consecutive terms below this fraction of the step's tolerance."""
 
 MIN_TERMS = 6
 """Fewest terms of a series: those that contain R."""
@@ -35,31 +30,23 @@ about 12²: at |λ| h = 12 rounding has grown to 1e-16 e¹². More terms for lon
 steps."""
 
 
-def scale_block(work, block, body, other, step):
-    """Write the derivatives of a body's acceleration by another body's motion, scaled by the
-    step."""
+RADAU_TERM = 5.0
+"""Steps may become too long for a series only if the largest of its terms from the fourth on would
+be at most this multiple of the tolerance: Radau IIA, whose estimate of a term is about a tenth of
+it, then has half the tolerance as its error."""
+
+LONGEST_SERIES_GROWTH = 2.0
+"""In that case the limit of the series is raised by this factor at once."""
+
+
+def store_block(work, block, body, other, step):
+    """Store the derivatives of a body's force by another body's motion, those by velocities over
+    the step."""
     for i in range(3):
-        # c_{k+2} then follows from c_k and c_{k+1} by products alone.
-        mobility = work.weights[MOVED, body, i]
         for j in range(3):
             stiffness = work.jacobian[STIFFNESS, block, i, j]
-            damping = work.jacobian[DAMPING, block, i, j] / step
-            work.linear[STIFFNESS, body, other, i, j] = mobility * stiffness
-            work.linear[DAMPING, body, other, i, j] = mobility * damping
-
-
-def scale_derivatives(scene, work, step):
-    """Write h²/M, the levers, and all derivatives scaled by the step."""
-    for body in range(work.place.shape[1]):
-        for axis in range(3):
-            mobility = scene.bodies[body].free * step * step / inertia(scene, body, axis)
-            work.weights[MOVED, body, axis] = mobility
-            work.weights[LEVER, body, axis] = lever(scene, body, axis)
-        scale_block(work, body, body, body, step)
-    for pair in range(work.tally.pairs):
-        later, earlier = work.pairs[pair].later, work.pairs[pair].earlier
-        scale_block(work, lower_block(work, pair), later, earlier, step)
-        scale_block(work, upper_block(work, pair), earlier, later, step)
+            work.linear[STIFFNESS, body, other, i, j] = stiffness
+            work.linear[DAMPING, body, other, i, j] = work.jacobian[DAMPING, block, i, j] / step
 
 
 def write_term(work, which, k):
@@ -71,9 +58,9 @@ def write_term(work, which, k):
         if k < 4:
             # r_k for k ≤ 3. The series of the motion starts here from k = 1: its term 2 holds the
             # forces at the start.
-            first = work.remainder[which, k, body, 0] * weights[MOVED, body, 0]
-            second = work.remainder[which, k, body, 1] * weights[MOVED, body, 1]
-            third = work.remainder[which, k, body, 2] * weights[MOVED, body, 2]
+            first = work.remainder[which, k, body, 0]
+            second = work.remainder[which, k, body, 1]
+            third = work.remainder[which, k, body, 2]
         for other in range(work.place.shape[1]):
             for j in range(3):
                 # Subtract K c_k and (k + 1)/h D c_{k+1} of all bodies.
@@ -85,7 +72,9 @@ def write_term(work, which, k):
                 second -= linear[DAMPING, body, other, 1, j] * speed
                 third -= linear[STIFFNESS, body, other, 2, j] * position
                 third -= linear[DAMPING, body, other, 2, j] * speed
-        first, second, third = factor * first, factor * second, factor * third
+        first *= factor * weights[MOVED, body, 0]
+        second *= factor * weights[MOVED, body, 1]
+        third *= factor * weights[MOVED, body, 2]
         series[which, k + 2, body, 0] = first
         series[which, k + 2, body, 1] = second
         series[which, k + 2, body, 2] = third
@@ -103,17 +92,23 @@ def longest_persistence(work):
 
 
 def write_first_terms(scene, work, step):
-    """Write terms 0 to 2 of the motion: zero, velocity and acceleration."""
-    scale_derivatives(scene, work, step)
-    series = work.series
+    """Write terms 0 to 2 of the motion: zero, velocity and acceleration; and all that further ones
+    follow from: h²/M, the levers and the derivatives."""
+    series, weights = work.series, work.weights
     for body in range(work.place.shape[1]):
         for axis in range(3):
+            mobility = scene.bodies[body].free * step * step / inertia(scene, body, axis)
+            weights[MOVED, body, axis] = mobility
+            weights[LEVER, body, axis] = lever(scene, body, axis)
             # The series holds displacements from the start of the step.
             series[MOTION, 0, body, axis] = 0.0
-            speed = work.velocity[NOW, body, axis]
-            series[MOTION, 1, body, axis] = step * speed
-            force = 0.5 * work.force[NOW, body, axis]
-            series[MOTION, 2, body, axis] = work.weights[MOVED, body, axis] * force
+            series[MOTION, 1, body, axis] = step * work.velocity[NOW, body, axis]
+            series[MOTION, 2, body, axis] = 0.5 * mobility * work.force[NOW, body, axis]
+        store_block(work, body, body, body, step)
+    for pair in range(work.tally.pairs):
+        later, earlier = work.pairs[pair].later, work.pairs[pair].earlier
+        store_block(work, lower_block(work, pair), later, earlier, step)
+        store_block(work, upper_block(work, pair), earlier, later, step)
 
 
 def longest_step_ratio(last, late, early, goal):
@@ -145,139 +140,72 @@ def phase_bound(work):
                 for j in range(3):
                     size = abs(work.linear[STIFFNESS, body, other, axis, j])
                     total += size / weights[LEVER, other, j]
-            largest = max(largest, total * weights[LEVER, body, axis])
+            total *= weights[MOVED, body, axis] * weights[LEVER, body, axis]
+            largest = max(largest, total)
     return math.sqrt(largest)
 
 
-def expand(scene, work, clock, step, goal):
-    """Write the series of the motion; return its number of terms, or 0 if it does not end.
+def write_terms(work, which, first, step, goal):
+    """Write the terms of a series from ``first`` + 2 on, until they matter less than ``goal`` [m].
 
-    Terms matter above TERM_TOLERANCE of ``goal`` [m].
+    Return their number, TERMS if the series does not end; the larger of the last two and of the two
+    before; and the largest from the fourth on [m].
     """
-    write_first_terms(scene, work, step)
-    goal, small_terms, persistence = TERM_TOLERANCE * goal, 0, longest_persistence(work) / step
     one, two, three, size = math.inf, math.inf, math.inf, math.inf
-    for k in range(1, TERMS - 2):
+    small_terms, largest, persistence = 0, 0.0, longest_persistence(work) / step
+    for k in range(first, TERMS - 2):
         three, two, one = two, one, size
         # A term displaces a body now, and later by its velocity (k + 2)/h for as long as that
         # persists.
-        size = write_term(work, MOTION, k) * (1.0 + persistence * (k + 2.0))
+        size = write_term(work, which, k) * (1.0 + persistence * (k + 2.0))
+        largest = max(largest, size) if k > 1 else 0.0
         small_terms = small_terms + 1 if size <= goal else 0
         # Two terms in a row: even and odd ones are its cosine and sine, one of which may vanish.
         if small_terms >= 2 and k + 3 >= MIN_TERMS:
-            growth = longest_step_ratio(k + 2, max(size, one), max(two, three), goal)
-            clock.longest_series, clock.series_norm = step * growth, phase_bound(work)
-            return k + 3
+            return k + 3, max(size, one), max(two, three), largest
         if not size < math.inf:
             break
+    return TERMS, math.inf, math.inf, math.inf
+
+
+def expand(work, clock, step, allowed):
+    """Write the series of the motion, whose first terms are known; return its number of terms, or 0
+    if it does not end.
+
+    ``allowed`` [m] is the step's tolerance.
+    """
+    goal = TERM_TOLERANCE * allowed
+    terms, late, early, largest = write_terms(work, MOTION, 1, step, goal)
     clock.longest_series = math.inf
-    return 0
+    if terms == TERMS:
+        return 0
+    growth = longest_step_ratio(terms - 1, late, early, goal)
+    # The error of Radau IIA scales as h⁴. Where it would be small at the longest series, longer
+    # steps may be Radau's.
+    if largest * growth**4 <= RADAU_TERM * allowed:
+        growth *= LONGEST_SERIES_GROWTH
+    clock.longest_series = step * growth
+    return terms
 
 
-def clear_change(work):
-    """Write the first terms of a change of the motion that starts from zero."""
-    for body in range(work.place.shape[1]):
-        for axis in range(3):
-            for k in range(3):
-                work.series[CHANGED, k, body, axis] = 0.0
-
-
-def add_change(work, terms, step, goal):
-    """Add the series that the change of R causes to the motion; return the number of terms, or 0.
-
-    ``terms`` is the number before; 0 says that the series of the change does not end.
-    """
-    series, goal, small_terms = work.series, TERM_TOLERANCE * goal, 0
-    persistence = longest_persistence(work) / step
-    clear_change(work)
-    for k in range(1, TERMS - 2):
-        size = write_term(work, CHANGED, k) * (1.0 + persistence * (k + 2.0))
-        small_terms = small_terms + 1 if size <= goal else 0
-        for body in range(work.place.shape[1]):
-            for axis in range(3):
-                before = series[MOTION, k + 2, body, axis] if k + 2 < terms else 0.0
-                change = series[CHANGED, k + 2, body, axis]
-                series[MOTION, k + 2, body, axis] = before + change
-        if small_terms >= 2 and k + 3 >= MIN_TERMS:
-            return max(terms, k + 3)
-        if not size < math.inf:
-            break
-    return 0
-
-
-def evaluate_change(work, first, step, fraction, kind):
-    """Write a change of positions and velocities at a fraction of the step into the state ``kind``.
-
-    Terms before ``first`` + 2 have been written; the others follow here, as many as are needed.
-    """
+def evaluate_body(work, which, start, terms, step, fraction, state, body):
+    """Write the motion of a body at a fraction of the step to a state: that of the state ``start``
+    plus the series."""
     series = work.series
-    # Terms 0 and 1: initial change of position and velocity.
+    for axis in range(3):
+        # Horner's scheme, from term 2 on.
+        place = speed = 0.0
+        for k in range(terms - 1, 1, -1):
+            term = series[which, k, body, axis]
+            place, speed = fraction * place + term, fraction * speed + k * term
+        # In differences, a coordinate at rest stays exactly where it is.
+        place = fraction * (series[which, 1, body, axis] + fraction * place)
+        work.place[state, body, axis] = work.place[start, body, axis] + place
+        speed *= fraction / step
+        work.velocity[state, body, axis] = work.velocity[start, body, axis] + speed
+
+
+def evaluate_all(work, which, start, terms, step, fraction, state):
+    """Write the motion of all bodies at a fraction of the step to a state; see evaluate_body."""
     for body in range(work.place.shape[1]):
-        for axis in range(3):
-            work.place[kind, body, axis] = series[CHANGED, 0, body, axis]
-            work.place[kind, body, axis] += fraction * series[CHANGED, 1, body, axis]
-            work.velocity[kind, body, axis] = series[CHANGED, 1, body, axis] / step
-    largest, small_terms, power = 0.0, 0, fraction**first
-    for k in range(first, TERMS - 2):
-        # In velocities, which outlast places.
-        size = (k + 2.0) * write_term(work, CHANGED, k)
-        rate, power = (k + 2.0) * power * fraction / step, power * fraction
-        for body in range(work.place.shape[1]):
-            for axis in range(3):
-                term = series[CHANGED, k + 2, body, axis]
-                work.place[kind, body, axis] += power * fraction * term
-                work.velocity[kind, body, axis] += rate * term
-        largest = max(largest, size)
-        small_terms = small_terms + 1 if size <= ERROR_TERM_TOLERANCE * largest else 0
-        if (small_terms >= 2 and k + 3 >= MIN_TERMS) or not size < math.inf:
-            break
-
-
-def rescale(work, terms, fraction):
-    """Rescale the series, and everything it follows from, to a step shortened to a fraction."""
-    power = 1.0
-    # Coefficients of θ^k scale as the k-th power.
-    for k in range(1, terms):
-        power *= fraction
-        for body in range(work.place.shape[1]):
-            for axis in range(3):
-                work.series[MOTION, k, body, axis] *= power
-    for body in range(work.place.shape[1]):
-        for axis in range(3):
-            power = 1.0
-            for k in range(1, 4):
-                power *= fraction
-                work.remainder[MOTION, k, body, axis] *= power
-            # h² M⁻¹ K scales as h², and h M⁻¹ D as h.
-            work.weights[MOVED, body, axis] *= fraction * fraction
-            for other in range(work.place.shape[1]):
-                for j in range(3):
-                    work.linear[STIFFNESS, body, other, axis, j] *= fraction * fraction
-                    work.linear[DAMPING, body, other, axis, j] *= fraction
-
-
-def evaluate_at(work, start, terms, step, fraction, state, first, end):
-    """Write the motion of bodies ``first`` up to but excluding ``end`` at a fraction of the step.
-
-    The series is added to the motion in state ``start`` and written to ``state``.
-    """
-    series = work.series
-    for body in range(first, end):
-        for axis in range(3):
-            work.place[state, body, axis] = work.velocity[state, body, axis] = 0.0
-    power = fraction
-    # Sum the terms in order of k, for positions and velocities.
-    for k in range(2, terms):
-        rate = k * power / step
-        power *= fraction
-        for body in range(first, end):
-            for axis in range(3):
-                term = series[MOTION, k, body, axis]
-                work.place[state, body, axis] += power * term
-                work.velocity[state, body, axis] += rate * term
-    for body in range(first, end):
-        for axis in range(3):
-            # In differences, a coordinate at rest stays exactly where it is.
-            work.place[state, body, axis] += fraction * series[MOTION, 1, body, axis]
-            work.place[state, body, axis] += work.place[start, body, axis]
-            work.velocity[state, body, axis] += work.velocity[start, body, axis]
+        evaluate_body(work, which, start, terms, step, fraction, state, body)

@@ -32,9 +32,9 @@ from flocsim.integrators.backward_euler.method import hand_over
 from flocsim.integrators.backward_euler.step import note_rates
 from flocsim.integrators.events.crossings import (
     any_overtakes,
+    any_too_deep,
     any_touching,
     changes_sides,
-    is_too_deep,
     may_switch,
     passes_through_reach,
 )
@@ -85,14 +85,6 @@ MOST_TRIALS = 12
 MOST_STATIONARY = 100
 """Steps in a row without motion before a run has stalled. Pairs that switch one directly after
 another need fewer."""
-
-
-def any_too_deep(scene, work):
-    """Return True if a listed pair overlaps past the limit of the contact law."""
-    deep = False
-    for row in range(work.tally.candidates):
-        deep = deep or is_too_deep(scene, work, NOW, row)
-    return deep
 
 
 def adopt_new_state(work):
@@ -246,7 +238,7 @@ def record_and_observe(scene, work, observed, clock, counts, record, lists):
     """Record the accepted state and show it to the observer. Return a Status, or 0 to continue."""
     if record.shape[0] > 0:
         record_row(work, clock, counts, record)
-    if lists and any_too_deep(scene, work):
+    if lists and any_too_deep(scene, work, NOW):
         return TOO_DEEP
     counts.code = observe(scene, work, observed, clock.time)
     return STOPPED if counts.code != 0 else 0

@@ -120,7 +120,7 @@ def propagate_vector(scene, work, clock, step):
     # Series: the derivatives of the power series are known exactly. The step may have been cut, so
     # propagate over the fraction of the series that was used.
     bound_propagated(scene, work)
-    full = clock.series_step
+    full = work.tally.series_step
     propagate_with_series(work, clock, full, step / full)
     # Let the scalar sums grow at the rate of the vector, for example towards an attraction.
     if nothing_swings(clock):
