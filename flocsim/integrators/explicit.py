@@ -51,20 +51,20 @@ def state_of(stage):
     return NOW if stage == 0 else FIRST_STAGE + stage - 1
 
 
-def combine(scene, work, weights, stages, base, end):
-    """Write ``base`` times the motion of NOW, plus the weighted rates of the first stages, to
-    ``end``."""
+def combine(scene, work, weights, stages, step, base, end):
+    """Write ``base`` times the motion of NOW, plus the step times the weighted rates of the first
+    stages, to ``end``."""
     for body in range(scene.bodies.shape[0]):
         for axis in range(3):
-            displacement = speed_change = 0.0
+            speed = change = 0.0
             for stage in range(stages):
                 # Most rows of the tableau have zeros.
                 if weights[stage] != 0.0:
                     state = state_of(stage)
-                    displacement += weights[stage] * work.velocity[state, body, axis]
-                    speed_change += weights[stage] * acceleration(scene, work, state, body, axis)
-            work.place[end, body, axis] = base * work.place[NOW, body, axis] + displacement
-            work.velocity[end, body, axis] = base * work.velocity[NOW, body, axis] + speed_change
+                    speed += weights[stage] * work.velocity[state, body, axis]
+                    change += weights[stage] * acceleration(scene, work, state, body, axis)
+            work.place[end, body, axis] = base * work.place[NOW, body, axis] + step * speed
+            work.velocity[end, body, axis] = base * work.velocity[NOW, body, axis] + step * change
 
 
 def combine_slips(scene, work, weights, stages, step, end):
@@ -79,17 +79,12 @@ def combine_slips(scene, work, weights, stages, step, end):
             work.slip[end, row] = slip_in(scene, work, end, row, work.slip[NOW, row] + step * total)
 
 
-def scaled(weights, step):
-    a, b, c, d, e, f, g = weights
-    return a * step, b * step, c * step, d * step, e * step, f * step, g * step
-
-
 def evaluate_stages(scene, work, time, step):
     """Evaluate all seven stages; the last one becomes NEW."""
     for stage in range(7):
         state = state_of(stage)
         if stage > 0:
-            combine(scene, work, scaled(MATRIX[stage], step), stage, 1.0, state)
+            combine(scene, work, MATRIX[stage], stage, step, 1.0, state)
         # Contacts are located before the forces are summed: these need the tangential
         # displacements.
         locate_with_slip_rates(scene, work, state)
@@ -133,7 +128,7 @@ class DormandPrince54(Integrator):
         # For how long a velocity error persists decides its weight.
         weigh_velocities(scene, work, time, max(end_of_run(clock) - time, step))
         # The embedded estimate, to STEP_ERROR.
-        combine(scene, work, scaled(ESTIMATE, step), 7, 0.0, STEP_ERROR)
+        combine(scene, work, ESTIMATE, 7, step, 0.0, STEP_ERROR)
         return error_ratio(scene, work, clock, step)
 
     @staticmethod

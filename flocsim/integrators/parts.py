@@ -65,9 +65,7 @@ def evaluate_as_they_lie(scene, work):
     """
     if not rebuild_list(scene, work):
         return False
-    locate_contacts(scene, work, NOW)
-    set_closed(work)
-    flag_near(scene, work, NOW, 0.0)
+    locate_and_flag(scene, work, NOW)
     evaluate(scene, work, 0.0, NOW)
     return True
 

@@ -13,7 +13,7 @@ from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.hooks import SLIP_LIMIT, awaits_touch, contact_event, has
 from flocsim.integrators.events.crossings import NEVER, first_switch
-from flocsim.integrators.events.grazes import first_grazing_end
+from flocsim.integrators.events.grazes import START_FRACTION, grazing_end_share
 from flocsim.integrators.events.resolution import OVERLAP_FRACTION
 from flocsim.integrators.rhs.error import at_least_rounding, step_tolerance
 from flocsim.integrators.rhs.friction import set_sliding, slip_transition
@@ -70,41 +70,26 @@ def kink_share(scene, work, row, which):
     return (1.0 + 0.5 * KINK_FINENESS) * before / (before - after)
 
 
-def first_kink_share(scene, work, share):
-    """Return the fraction of the step at which the first contact passes a kink, at most
-    ``share``."""
-    for row in range(work.tally.candidates):
-        if work.candidates[row].contact_mode == CLOSED:
-            for which in range(scene.events):
-                share = min(share, kink_share(scene, work, row, which))
-    return share
-
-
-def first_slip_share(scene, work, share, step, resolution):
-    """Return the fraction of the step at which the first contact begins or ends to slide, at most
-    ``share``.
-
-    A violation of less than ``resolution`` [m] at the end of the step does not count.
-    """
-    for row in range(work.tally.candidates):
-        if work.candidates[row].contact_mode == CLOSED:
-            distance, share_there = slip_transition(scene, work, row, step)
-            if distance > resolution:
-                share = min(share, share_there)
-    return share
-
-
 def first_law_share(scene, work, clock, step):
-    """Return the fraction of the step at which the law of a closed contact first changes: a kink,
-    sliding, sticking or the end of grazing.
+    """Return the fraction of the step at which the law of a contact first changes: a kink, sliding,
+    sticking or the end of grazing.
 
     Above 1 if none does. Expects the geometry of all pairs in NEW.
     """
-    # Kinks and the end of grazing; then sliding, if there is a Coulomb limit.
-    share = first_grazing_end(work, clock, step, first_kink_share(scene, work, NEVER))
-    if has(scene, SLIP_LIMIT):
-        resolution, _ = switch_resolutions(work, clock)
-        share = first_slip_share(scene, work, share, step, resolution)
+    share, (resolution, _) = NEVER, switch_resolutions(work, clock)
+    for row in range(work.tally.candidates):
+        mode = work.candidates[row].contact_mode
+        if mode == GRAZING:
+            end = grazing_end_share(work, clock, step, row)
+            share = min(share, (1.0 + START_FRACTION) * end)
+        if mode == CLOSED:
+            for which in range(scene.events):
+                share = min(share, kink_share(scene, work, row, which))
+            # Sliding and sticking, if there is a Coulomb limit.
+            if has(scene, SLIP_LIMIT):
+                distance, transition = slip_transition(scene, work, row, step)
+                if distance > resolution:
+                    share = min(share, transition)
     return share
 
 

@@ -19,8 +19,8 @@ from flocsim.integrators.events.crossings import NEVER
 from flocsim.integrators.rhs.error import at_least_rounding
 from flocsim.integrators.rhs.friction import (
     GRAZING_STIFFNESS_RATIO,
+    gap_responses,
     grazing_force,
-    tangential_coupling,
 )
 from flocsim.integrators.rhs.views import (
     contact_view,
@@ -63,7 +63,8 @@ def begins_grazing(scene, work, clock, row):
     # Height of the flight: v²/(2 a), with the acceleration a that its own tangential force causes.
     view = contact_view(scene, work, NOW, row)
     _, force = contact_force(scene, view)
-    speed, pull = normal_rate(work, NOW, row), abs(force * tangential_coupling(scene, work, row))
+    _, by_tangential = gap_responses(scene, work, row)
+    speed, pull = normal_rate(work, NOW, row), abs(force * by_tangential)
     share = FLIGHT_HEIGHT if chatters(work, row) else FIRST_FLIGHT_HEIGHT
     if speed * speed > 2.0 * pull * share * clock.tolerance:
         return False
@@ -352,12 +353,3 @@ def end_grazing_early(scene, work, clock, step):
                 end_grazing(work, row, CLOSED, TOUCHING_GAP)
             changed = True
     return changed
-
-
-def first_grazing_end(work, clock, step, share):
-    """Return the fraction of the step at which the first pair ceases to graze, at most
-    ``share``."""
-    for row in range(work.tally.candidates):
-        if work.candidates[row].contact_mode == GRAZING:
-            share = min(share, (1.0 + START_FRACTION) * grazing_end_share(work, clock, step, row))
-    return share

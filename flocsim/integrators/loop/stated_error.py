@@ -31,6 +31,7 @@ from flocsim.hooks import contact_force
 from flocsim.integrators.exponential.collocation import nothing_swings, propagate_with_series
 from flocsim.integrators.radau.carried_error import add_step_error, overlap_error, propagate_error
 from flocsim.integrators.rhs.contact_stiffness import unresolved_fraction
+from flocsim.integrators.rhs.error import outline_size
 from flocsim.integrators.rhs.friction import grazing_force
 from flocsim.integrators.rhs.propagated_error import (
     GRAZING_AMPLIFICATION,
@@ -39,7 +40,6 @@ from flocsim.integrators.rhs.propagated_error import (
     VECTOR_SAFETY,
     bound_propagated,
     lifted_load,
-    propagated_size,
 )
 from flocsim.integrators.rhs.views import contact_view, lever, normal_rate, pair_loads
 from flocsim.state.bodies import ANGLE, X, Y
@@ -173,7 +173,7 @@ def propagate_errors(scene, work, clock, step):
                 LEAST_VECTOR * clock.tolerance,
                 SWITCH_FLOOR * errors.switch_displacement,
             )
-            own = max(propagated_size(scene, work, body), least)
+            own = max(outline_size(scene, work.place, PROPAGATED, body), least)
             stated = min(stated, VECTOR_SAFETY * own)
         errors.stated = stated
         clock.error = max(clock.error, stated)

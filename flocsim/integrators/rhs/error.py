@@ -94,27 +94,25 @@ def error_ratio(scene, work, clock, step):
     return error / max(step_tolerance(work, clock), rounding_error(scene, work, NEW, step))
 
 
-def body_error(scene, work, body):
-    """Return the error of one body [m], from STEP_ERROR; its two parts are stored in
-    ``work.errors``."""
-    errors = work.errors[body]
-    size = scene.bodies[body].bounding_radius
-    # Displacement and velocity of the outline, rotation included.
-    place = length_of(
-        work.place[STEP_ERROR, body, X], work.place[STEP_ERROR, body, Y]
-    ) + size * abs(work.place[STEP_ERROR, body, ANGLE])
-    speed = length_of(
-        work.velocity[STEP_ERROR, body, X], work.velocity[STEP_ERROR, body, Y]
-    ) + size * abs(work.velocity[STEP_ERROR, body, ANGLE])
-    errors.step_displacement, errors.step_velocity = place, speed
-    return place + speed * errors.velocity_lifetime
+def outline_size(scene, vectors, kind, body):
+    """Return the length of a body's row of vectors, such as errors, at its outline, rotation
+    included.
+
+    ``vectors`` and ``kind``: an array and a state, such as ``work.place`` and STEP_ERROR [m].
+    """
+    turn = scene.bodies[body].bounding_radius * abs(vectors[kind, body, ANGLE])
+    return length_of(vectors[kind, body, X], vectors[kind, body, Y]) + turn
 
 
 def largest_error(scene, work):
-    """Return the largest error of a body [m]; inf if it or the new state is not finite."""
+    """Return the largest error of a body [m], from STEP_ERROR; inf if one is not finite. Its two
+    parts are stored in ``work.errors``."""
     largest = 0.0
     for body in range(scene.bodies.shape[0]):
-        error = body_error(scene, work, body)
+        errors = work.errors[body]
+        errors.step_displacement = outline_size(scene, work.place, STEP_ERROR, body)
+        errors.step_velocity = outline_size(scene, work.velocity, STEP_ERROR, body)
+        error = errors.step_displacement + errors.step_velocity * errors.velocity_lifetime
         if not error < math.inf:
             return math.inf
         largest = max(largest, error)

@@ -242,32 +242,19 @@ def grazing_force(work, state, row):
     return force - contact.grazing_resistance * normal_rate(work, state, row)
 
 
-def normal_mobility(scene, work, row):
-    """Return the acceleration of the gap per unit normal force on a pair alone [1/kg]."""
-    candidate = work.candidates[row]
-    total, g = 0.0, work.geometry
-    a, b = candidate.vertex_body, candidate.edge_body
-    if scene.bodies[a].free == 1.0:
-        arm = g[NOW, row].vertex_arm_n
-        total += 1.0 / scene.bodies[a].mass + arm * arm / scene.bodies[a].inertia
-    if scene.bodies[b].free == 1.0:
-        arm = g[NOW, row].edge_arm_n
-        total += 1.0 / scene.bodies[b].mass + arm * arm / scene.bodies[b].inertia
-    return total
+def gap_responses(scene, work, row):
+    """Return the acceleration of the gap per unit normal and per unit tangential force on a pair
+    alone [1/kg].
 
-
-def tangential_coupling(scene, work, row):
-    """Return the acceleration of the gap per unit tangential force on a pair alone [1/kg].
-
-    It is not zero where the contact point lies beside the line of the centroids.
+    The second is not zero where the contact point lies beside the line of the centroids.
     """
-    candidate = work.candidates[row]
-    total, g = 0.0, work.geometry
-    a, b = candidate.vertex_body, candidate.edge_body
-    if scene.bodies[a].free == 1.0:
-        arms = g[NOW, row].vertex_arm_n * g[NOW, row].vertex_arm_t
-        total += arms / scene.bodies[a].inertia
-    if scene.bodies[b].free == 1.0:
-        arms = g[NOW, row].edge_arm_n * g[NOW, row].edge_arm_t
-        total += arms / scene.bodies[b].inertia
-    return total
+    candidate, geometry = work.candidates[row], work.geometry[NOW, row]
+    normal = tangential = 0.0
+    for body, arm_n, arm_t in (
+        (candidate.vertex_body, geometry.vertex_arm_n, geometry.vertex_arm_t),
+        (candidate.edge_body, geometry.edge_arm_n, geometry.edge_arm_t),
+    ):
+        if scene.bodies[body].free == 1.0:
+            normal += 1.0 / scene.bodies[body].mass + arm_n * arm_n / scene.bodies[body].inertia
+            tangential += arm_n * arm_t / scene.bodies[body].inertia
+    return normal, tangential

@@ -138,11 +138,6 @@ def sliding_row(scene, work, row):
     return (tx, ty, arm_a), (-tx, -ty, -arm_b - beside), arm_a, arm_b
 
 
-def scaled(row, share):
-    x, y, angle = row
-    return x * share, y * share, angle * share
-
-
 def add_geometric_stiffness(scene, work, row, normal, tangential):
     """Add the derivative by position of a pair's force of constant size (N, T) [N]; see the
     module."""
@@ -150,11 +145,7 @@ def add_geometric_stiffness(scene, work, row, normal, tangential):
     a, b = candidate.vertex_body, candidate.edge_body
     g, stiffness, pair = work.geometry, work.jacobian, candidate.pair
     slide_a, slide_b, arm_a, arm_b = sliding_row(scene, work, row)
-    nx, ny, turning = (
-        g[NOW, row].normal_x,
-        g[NOW, row].normal_y,
-        g[NOW, row].turning,
-    )
+    nx, ny, turning = g[NOW, row].normal_x, g[NOW, row].normal_y, g[NOW, row].turning
     # N t − T n, and A − (torque of the turned arm), for a unit turn ψ.
     fx, fy = -normal * ny - tangential * nx, normal * nx - tangential * ny
     torque_a = normal * arm_a - tangential * g[NOW, row].vertex_arm_n
@@ -163,16 +154,13 @@ def add_geometric_stiffness(scene, work, row, normal, tangential):
     # Foot inside the edge: ψ = θ_b, and the foot slides by σ.
     if turning == 0.0:
         out = (fx, fy, torque_a), (-fx, -fy, 0.0)
-        add_outer_products(
-            scene, work, STIFFNESS, pair, a, b, out, (ZERO_ROW, (0.0, 0.0, 1.0)), -1.0
-        )
-        on_b = ZERO_ROW, (0.0, 0.0, 1.0)
+        on_b = ZERO_ROW, UNIT_TURN
+        add_outer_products(scene, work, STIFFNESS, pair, a, b, out, on_b, -1.0)
         add_outer_products(scene, work, STIFFNESS, pair, a, b, on_b, (slide_a, slide_b), -normal)
     else:
         # Foot at an end: the normal turns by ψ = σ/distance.
         out = (fx, fy, torque_a), (-fx, -fy, -torque_b)
-        by = scaled(slide_a, turning), scaled(slide_b, turning)
-        add_outer_products(scene, work, STIFFNESS, pair, a, b, out, by, -1.0)
+        add_outer_products(scene, work, STIFFNESS, pair, a, b, out, (slide_a, slide_b), -turning)
         stiffness[STIFFNESS, b, ANGLE, ANGLE] -= torque_b
 
 
@@ -336,6 +324,16 @@ ORIENTED_DIFFERENCE = 1e-6
 """Difference step as a fraction of the body's size where only oriented forces act."""
 
 
+def slopes(shifted, here, by):
+    """Return the forces and torques of a shifted evaluation less those here, over the shift."""
+    return (
+        (shifted[0] - here[0]) / by,
+        (shifted[1] - here[1]) / by,
+        (shifted[2] - here[2]) / by,
+        (shifted[3] - here[3]) / by,
+    )
+
+
 @hook
 def add_outline_derivatives(scene, work, time):
     """Add the derivatives of forces along outlines, and of oriented forces, by differences.
@@ -349,9 +347,9 @@ def add_outline_derivatives(scene, work, time):
         x, y = separation(scene, work, NOW, a, b)
         angle_a, angle_b = work.place[NOW, a, ANGLE], work.place[NOW, b, ANGLE]
         fx, fy = work.outline_forces[pair, 0], work.outline_forces[pair, 1]
-        torque_a, torque_b = work.outline_forces[pair, 2], work.outline_forces[pair, 3]
+        here = fx, fy, work.outline_forces[pair, 2], work.outline_forces[pair, 3]
         # Nothing acts here; the forces themselves were stored by add_outline_forces.
-        if fx == 0.0 and fy == 0.0 and torque_a == 0.0 and torque_b == 0.0:
+        if here == (0.0, 0.0, 0.0, 0.0):
             continue
         by = OUTLINE_DIFFERENCE * scene.outlines[1]
         if not outline_reach(scene) > 0.0:
@@ -361,27 +359,24 @@ def add_outline_derivatives(scene, work, time):
         across = outline_forces_at(scene, work, time, a, b, x + by, y, angle_a, angle_b)
         up = outline_forces_at(scene, work, time, a, b, x, y + by, angle_a, angle_b)
         turned = outline_forces_at(scene, work, time, a, b, x, y, angle_a + turn, angle_b)
-        by_x = ((across[0] - fx) / by, (across[1] - fy) / by, (across[2] - torque_a) / by)
-        by_y = ((up[0] - fx) / by, (up[1] - fy) / by, (up[2] - torque_a) / by)
-        by_a = ((turned[0] - fx) / turn, (turned[1] - fy) / turn, (turned[2] - torque_a) / turn)
-        on_b_x, on_b_y = (across[3] - torque_b) / by, (up[3] - torque_b) / by
-        on_b_a = (turned[3] - torque_b) / turn
+        by_x, by_y = slopes(across, here, by), slopes(up, here, by)
+        by_a = slopes(turned, here, turn)
         # Turning b alone is turning the whole scene and turning a back: ∂F/∂θ_b = ẑ × F − ∂F/∂x (ẑ
         # × r) − ∂F/∂θ_a.
         by_b = (
-            -fy + by_x[0] * y - by_y[0] * x - by_a[0],
-            fx + by_x[1] * y - by_y[1] * x - by_a[1],
+            by_x[0] * y - by_y[0] * x - by_a[0] - fy,
+            by_x[1] * y - by_y[1] * x - by_a[1] + fx,
             by_x[2] * y - by_y[2] * x - by_a[2],
+            by_x[3] * y - by_y[3] * x - by_a[3],
         )
-        on_b_b = on_b_x * y - on_b_y * x - on_b_a
         # −∂F/∂q, with the reverse force on b.
-        for column, on_a, on_b in (
-            (RELATIVE_X, by_x, on_b_x),
-            (RELATIVE_Y, by_y, on_b_y),
-            ((UNIT_TURN, ZERO_ROW), by_a, on_b_a),
-            ((ZERO_ROW, UNIT_TURN), by_b, on_b_b),
+        for column, (on_x, on_y, on_a, on_b) in (
+            (RELATIVE_X, by_x),
+            (RELATIVE_Y, by_y),
+            ((UNIT_TURN, ZERO_ROW), by_a),
+            ((ZERO_ROW, UNIT_TURN), by_b),
         ):
-            out = on_a, (-on_a[0], -on_a[1], on_b)
+            out = (on_x, on_y, on_a), (-on_x, -on_y, on_b)
             add_outer_products(scene, work, STIFFNESS, pair, a, b, out, column, -1.0)
 
 

@@ -3,10 +3,12 @@
 The vector stays within the sums of the same errors (loop/stated_error.py), body by body.
 """
 
-from flocsim.geometry.contact.points import length_of, normal_component, tangential_component
-from flocsim.integrators.rhs.friction import normal_mobility, tangential_coupling
+import math
+
+from flocsim.geometry.contact.points import normal_component, tangential_component
+from flocsim.integrators.rhs.error import outline_size
+from flocsim.integrators.rhs.friction import gap_responses
 from flocsim.integrators.rhs.views import velocity_lifetime_of
-from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.work import NOW, PROPAGATED
 
 SWITCH_AMPLIFICATION = 1.5
@@ -22,12 +24,6 @@ know that contacts end sooner or later because of it."""
 GRAZING_IN_VECTOR = GRAZING_AMPLIFICATION / VECTOR_SAFETY
 """Fraction of that error that enters the propagated vector. It is a bound already, so VECTOR_SAFETY
 must not multiply it."""
-
-
-def propagated_size(scene, work, body):
-    """Return the displacement of a body's outline by its propagated error [m]."""
-    turn = scene.bodies[body].bounding_radius * abs(work.place[PROPAGATED, body, ANGLE])
-    return length_of(work.place[PROPAGATED, body, X], work.place[PROPAGATED, body, Y]) + turn
 
 
 def certain_bound(work, body):
@@ -69,7 +65,7 @@ def scale_down_clusters(scene, work):
         work.clusters[leader].largest_displacement = bound
     # The smallest factor that its bodies need.
     for body in range(work.poses.shape[0]):
-        leader, size = work.cluster[body], propagated_size(scene, work, body)
+        leader, size = work.cluster[body], outline_size(scene, work.place, PROPAGATED, body)
         bound = max(work.clusters[leader].largest_displacement, displacement_bound(work, body))
         if size > bound:
             work.clusters[leader].scale = min(work.clusters[leader].scale, bound / size)
@@ -95,7 +91,7 @@ def bound_propagated(scene, work):
     largest = 0.0
     scale_down_clusters(scene, work)
     for body in range(work.poses.shape[0]):
-        size = propagated_size(scene, work, body)
+        size = outline_size(scene, work.place, PROPAGATED, body)
         take_over_excess(work, body, size)
         largest = max(largest, size)
     return largest
@@ -104,7 +100,8 @@ def bound_propagated(scene, work):
 def lifted_load(scene, work, row, tangential):
     """Return the load [N] that a tangential force lifts, and that presses where the force is
     absent."""
-    return tangential * tangential_coupling(scene, work, row) / normal_mobility(scene, work, row)
+    by_normal, by_tangential = gap_responses(scene, work, row)
+    return tangential * by_tangential / by_normal
 
 
 def grazing_error_source(scene, work, row, tangential):
@@ -120,7 +117,5 @@ def grazing_error_source(scene, work, row, tangential):
     opening += memory * normal_component(work, row, work.velocity, PROPAGATED, NOW)
     slipping = tangential_component(work, row, work.place, PROPAGATED, NOW)
     slipping += memory * tangential_component(work, row, work.velocity, PROPAGATED, NOW)
-    share = (
-        -GRAZING_IN_VECTOR if normal * opening + tangential * slipping < 0.0 else GRAZING_IN_VECTOR
-    )
+    share = math.copysign(GRAZING_IN_VECTOR, normal * opening + tangential * slipping)
     return share * normal, share * tangential
