@@ -76,17 +76,6 @@ def solve_as_series(scene, work, clock, step, known):
     return error_ratio(scene, work, clock, step)
 
 
-def forget_series(work, clock, known):
-    """Mark the stages of the last step as no longer a series, for the initial guess of Radau.
-
-    ``clock.stages_step`` < 0 says that START holds the state that long ago: a mean acceleration
-    follows from it, but no stages.
-    """
-    if known:
-        staged = clock.stages_step > 0.0
-        clock.stages_step = clock.stages_time - clock.time if staged else 0.0
-
-
 @attrs.frozen
 class Implicit(Integrator):
     """Adaptive implicit method, stable for contacts of any stiffness: the default.
@@ -144,7 +133,9 @@ class Implicit(Integrator):
             if work.tally.kind == SERIES:
                 return ratio
         work.tally.kind = RADAU
-        forget_series(work, clock, known)
+        if known:
+            # The points of a series are no stages from which Radau's could be extrapolated.
+            clock.stages_step = 0.0
         # Radau with grazing contacts: set their dashpots by the system without them, then assemble
         # anew. A contact that is released leaves the forces, too.
         if grazes:

@@ -88,7 +88,6 @@ class Pose(Record):
     known_angle: float  # nearby angle whose cosine and sine are stored [rad]
     known_cosine: float
     known_sine: float
-    series_displacement: float  # bound of its points' displacement in a series step [m]
 
 
 class Disc(Record):

@@ -62,9 +62,7 @@ class Clock(Record):
     convergence_rate: float  # factor by which a Newton iteration shrinks the last increment
     second_iteration_rate: float  # that of the last second iteration; 0: unknown
     second_iteration_step: float  # size of the step in which it was measured [s]
-    # Size of the step whose stages are stored [s]; 0: none are; below 0: only its start, in START,
-    # that long ago.
-    stages_step: float
+    stages_step: float  # size of the step whose stages are stored [s]; 0: none are
     stages_time: float  # time at which that step began [s]
     # Motion as a power series.
     longest_series: float  # longest step for which the series converges; inf: not known [s]

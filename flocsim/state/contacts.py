@@ -77,10 +77,9 @@ class VertexAtEdge(Record):
     normal_x: float  # unit normal n from the foot on the edge to the vertex
     normal_y: float
     gap: float  # distance of the outlines, negative in overlap [m]
-    vertex_arm_n: (
-        float  # the moment about the vertex's body of a unit force along n, at the middle …
-    )
-    vertex_arm_t: float  # … of the overlap, and along t [m]
+    # Moments about the vertex's body of unit forces along n and t at the middle of the overlap.
+    vertex_arm_n: float  # [m]
+    vertex_arm_t: float  # [m]
     edge_arm_n: float  # the same moments about the edge's body [m]
     edge_arm_t: float
     turning: float  # rotation of n per displacement of the vertex along t [1/m]

@@ -272,11 +272,10 @@ def with_room(work: Work) -> Work:
     full, n, pairs = work.tally.full, len(work.poses), len(work.pairs)
     room = len(work.elimination.column)
     work.tally.full = NOTHING_FULL
-    larger: Work
+    sizes = {"rows": 2 * len(work.candidates)}
     if full == PAIRS_FULL:
-        larger = enlarged(work, **sizes_of_pairs(n, 2 * pairs, room))
+        sizes = sizes_of_pairs(n, 2 * pairs, room)
     elif full == BLOCKS_FULL:
-        larger = enlarged(work, room=2 * room, **sizes_of_pairs(n, pairs, 2 * room))
-    else:
-        larger = enlarged(work, rows=2 * len(work.candidates))
+        sizes = {"room": 2 * room} | sizes_of_pairs(n, pairs, 2 * room)
+    larger: Work = enlarged(work, **sizes)
     return larger

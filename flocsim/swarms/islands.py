@@ -88,7 +88,7 @@ def clear_body(work, body):
         work.kicks[body],
     )
     pose.listed_x = pose.listed_y = pose.listed_angle = pose.cosine = pose.sine = 0.0
-    pose.known_angle = pose.known_cosine = pose.known_sine = pose.series_displacement = 0.0
+    pose.known_angle = pose.known_cosine = pose.known_sine = 0.0
     errors.velocity_lifetime = errors.relaxation_time = errors.step_displacement = (
         errors.step_velocity
     ) = errors.stated = 0.0

@@ -19,9 +19,9 @@ from flocsim.integrators.events.crossings import (
 from flocsim.integrators.events.interpolation import end_within, interpolate
 from flocsim.integrators.exponential.collocation import NODES
 from flocsim.integrators.rhs.friction import excess_slip_rate, rolled, slip_limit_at
-from flocsim.integrators.rhs.views import contact_view, lever
+from flocsim.integrators.rhs.views import contact_view
 from flocsim.state.contacts import CLOSED, OPEN
-from flocsim.state.work import FIRST_STAGE, MOTION, NEW, NOW, TRIAL
+from flocsim.state.work import FIRST_STAGE, NEW, NOW, TRIAL
 
 PART_PHASE = 1.6
 """Phase [rad] of the fastest vibration in a part of the step: about a quarter of a period."""
@@ -39,29 +39,6 @@ def parts_by_phase(scene, phase):
     # Sliding, and kinks of a law, may come and go within half a period.
     threshold_phase = 1.0 if has(scene, SLIP_LIMIT) or scene.events > 0 else UNSAMPLED_PHASE
     return 1 if phase <= threshold_phase else int(phase / PART_PHASE) + 1
-
-
-def write_path_bounds(scene, work, terms):
-    """Write an upper bound of the path of each body's points in the step [m]."""
-    for body in range(work.place.shape[1]):
-        displacement = 0.0
-        for axis in range(3):
-            size = lever(scene, body, axis)
-            for k in range(1, terms):
-                displacement += size * abs(work.series[MOTION, k, body, axis])
-        work.poses[body].series_displacement = displacement
-
-
-def may_switch_in_step(work, row):
-    """Return True if a pair is closed, or comes near enough to switch in the step."""
-    candidate = work.candidates[row]
-    if candidate.contact_mode == CLOSED:
-        return True
-    a, b = candidate.vertex_body, candidate.edge_body
-    return (
-        margin(work, NOW, row)
-        <= work.poses[a].series_displacement + work.poses[b].series_displacement
-    )
 
 
 def place_bodies(work, step, share):
@@ -103,7 +80,6 @@ def has_changed_friction(scene, work, row, resolution):
 def first_sampled_switch(scene, work, parts, step, resolution, depth):
     """Return the first fraction of the step at which a sample shows an event; 1 if none before its
     end."""
-    write_path_bounds(scene, work, work.tally.series_terms)
     # Margins at the start.
     for row in range(work.tally.candidates):
         contact = work.contacts[row]
@@ -115,8 +91,6 @@ def first_sampled_switch(scene, work, parts, step, resolution, depth):
         place_bodies(work, step, high)
         for row in range(work.tally.candidates):
             contact = work.contacts[row]
-            if not may_switch_in_step(work, row):
-                continue
             locate_polygons(scene, work, TRIAL, row)
             value, rate = margin(work, TRIAL, row), margin_rate(work, TRIAL, row)
             if has_switched_in_trial(work, row, depth):

@@ -26,6 +26,7 @@ tips over one way or the other, is detected only by a perturbed companion run (a
 import math
 
 from flocsim.compiler.linker import apart
+from flocsim.constants import TINY
 from flocsim.geometry.contact.points import length_of, normal_component, tangential_component
 from flocsim.hooks import contact_force
 from flocsim.integrators.exponential.collocation import nothing_swings, propagate_with_series
@@ -54,17 +55,16 @@ and SWITCH_FLOOR of the sum of switching errors (a dozen grazes push it to and f
 UNCERTAIN_OVERLAP = 2.0
 """A contact may be open if its overlap is below this multiple of its gap's error."""
 
-LONG_RELAXATION = 1e6
-"""A relaxation time of more than this number of steps counts as infinite."""
-
 
 def propagate_sums(work, body, step):
     """Propagate the sums of a body's errors over a step: E_x += E_v τ (1 − e^(−h/τ)), E_v *=
     e^(−h/τ)."""
     errors = work.errors[body]
-    relaxation = errors.relaxation_time
-    decay = math.exp(-step / relaxation) if step < LONG_RELAXATION * relaxation else 0.0
-    effective_time = step if relaxation > LONG_RELAXATION * step else relaxation * (1.0 - decay)
+    relaxation = max(errors.relaxation_time, TINY)
+    decay, effective_time = (
+        math.exp(-step / relaxation),
+        -relaxation * math.expm1(-step / relaxation),
+    )
     errors.displacement += errors.velocity * effective_time
     errors.velocity *= decay
     errors.switch_displacement += errors.switch_velocity * effective_time

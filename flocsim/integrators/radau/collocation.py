@@ -124,18 +124,6 @@ def guess_constant_accelerations(scene, work, step):
                 work.velocity[FIRST_STAGE + stage, body, axis] = speed
 
 
-def guess_mean_accelerations(work, scale):
-    """Guess the mean acceleration of the last step; ``scale`` is this step's size over that
-    one's."""
-    for body in range(work.place.shape[1]):
-        for axis in range(3):
-            speed = work.velocity[NOW, body, axis]
-            gain = scale * (speed - work.velocity[START, body, axis])
-            for stage in range(3):
-                guess = speed + NODES[stage] * gain
-                work.velocity[FIRST_STAGE + stage, body, axis] = guess
-
-
 def is_nonstiff(work, step):
     """Return True if no contact or surface force acts, and drag hardly slows a body within a
     step."""
@@ -175,11 +163,8 @@ def extrapolate_cubic(work, begin, scale):
 def guess_stages(scene, work, clock, step):
     """Write a first guess of the stage velocities; store the start of the step."""
     staged = clock.stages_step
-    # The last step was a series: only its start is known, in START.
-    if staged < 0.0:
-        guess_mean_accelerations(work, -step / staged)
     # The stages of the last step are known, and not too short for this one.
-    elif staged > 0.0 and step <= MAX_EXTRAPOLATION * staged:
+    if staged > 0.0 and step <= MAX_EXTRAPOLATION * staged:
         extrapolate_cubic(work, (clock.time - clock.stages_time) / staged, step / staged)
     # Nothing is known: constant accelerations suit free motion, constant velocities a stiff
     # contact, whose acceleration soon ends.
