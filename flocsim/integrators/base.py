@@ -154,7 +154,6 @@ class Integrator(ABC):
             estimate_share=self.estimate_share,
             previous_step=math.inf,
             feasible_step=math.inf,
-            step_after_switch=math.inf,
             across=self.across,
         )
 

@@ -60,22 +60,6 @@ def is_retry(scene, clock):
     return staged and scene.listed_reach <= 0.0
 
 
-def solve_as_series(scene, work, clock, step, known):
-    """Take a step as a series; return its error over the tolerance, or −1 where no series is
-    possible.
-
-    ``known``: the previous step was a series, whose remainder can be extrapolated.
-    """
-    if not may_be_series(scene, work):
-        return -1.0
-    work.tally.series_terms = solve_series(scene, work, clock, step, known)
-    if work.tally.series_terms == 0:
-        return -1.0
-    work.tally.kind = SERIES
-    estimate_series_error(work, clock, step)
-    return error_ratio(scene, work, clock, step)
-
-
 @attrs.frozen
 class Implicit(Integrator):
     """Adaptive implicit method, stable for contacts of any stiffness: the default.
@@ -128,10 +112,12 @@ class Implicit(Integrator):
             gather_clusters(scene, work)
             assemble_jacobian(scene, work, time, remaining)
         # Try a series. It has no grazing contacts, whose dashpots are too stiff to resolve.
-        if not grazes:
-            ratio = solve_as_series(scene, work, clock, step, known)
-            if work.tally.kind == SERIES:
-                return ratio
+        if not grazes and may_be_series(scene, work):
+            work.tally.series_terms = solve_series(scene, work, clock, step, known)
+            if work.tally.series_terms > 0:
+                work.tally.kind = SERIES
+                estimate_series_error(work, clock, step)
+                return error_ratio(scene, work, clock, step)
         work.tally.kind = RADAU
         if known:
             # The points of a series are no stages from which Radau's could be extrapolated.

@@ -54,9 +54,6 @@ class Clock(Record):
     previous_step: float  # size of the last step [s]; inf: no trend is known, 0: a trial has failed
     previous_ratio: float  # its error over the tolerance
     rejected_step: float  # size of the trial just rejected [s]; 0: the last one was accepted
-    rejected_ratio: float  # its error over the tolerance
-    switch_streak: float  # steps in a row after which contacts have switched
-    step_after_switch: float  # size of the first step that followed the last streak [s]
     flight_step: float  # step planned when the last flight ended [s]
     # Newton's method and the stages of Radau IIA.
     convergence_rate: float  # factor by which a Newton iteration shrinks the last increment

@@ -133,8 +133,7 @@ def end_at_switches(scene, work, clock):
         math.inf,
     )
     # Forget everything about earlier steps.
-    clock.previous_step = clock.feasible_step = clock.step_after_switch = math.inf
-    clock.switch_streak = 0.0
+    clock.previous_step = clock.feasible_step = math.inf
     for row in range(work.tally.candidates):
         work.candidates[row].slide_direction = 0
     set_modes(scene, work)

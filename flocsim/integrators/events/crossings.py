@@ -296,47 +296,25 @@ RESOLVED_PHASE = 1.0
 """A step of this multiple of 1/ω0 follows a contact's vibration."""
 
 
-def deepest_touching(work, state, row, end):
-    """Return the closed row of the least gap in a state; −1 without one."""
-    deepest = -1
-    for each in range(row, end):
-        gap = work.geometry[state, each].gap
-        if work.candidates[each].contact_mode == CLOSED and (
-            deepest < 0 or gap < work.geometry[state, deepest].gap
-        ):
-            deepest = each
-    return deepest
-
-
-def overtaken_contact(work, row, end, closed):
-    """Return the row that was the deepest of two bodies before and was clearly overtaken; −1
-    without one."""
-    if closed:
-        old, new = deepest_touching(work, NOW, row, end), deepest_touching(work, NEW, row, end)
-    else:
-        old, new = least_row(work, NOW, row, end), least_row(work, NEW, row, end)
-    if old < 0 or old == new:
-        return -1
+def overtakes(work, old, new):
+    """Return True if a contact, the deepest of two bodies at the end of the step, has clearly
+    overtaken ``old``, the deepest at its start."""
     g = work.geometry
     old_overlap, new_overlap = -g[NOW, old].gap, -g[NEW, new].gap
-    if not (old_overlap > 0.0 and new_overlap > 0.0):
-        return -1
     # Sum of the leads that the old deepest contact had at the start and the new one has at the end.
     shift = min(g[NOW, new].gap, 0.0) + old_overlap + min(g[NEW, old].gap, 0.0) + new_overlap
-    return old if shift > OVERTAKE_FRACTION * (old_overlap + new_overlap) else -1
+    clear = shift > OVERTAKE_FRACTION * (old_overlap + new_overlap)
+    return clear and old != new and min(old_overlap, new_overlap) > 0.0
 
 
 def any_overtakes(scene, work, clock, step):
     """Return True if a contact has overtaken another of the same bodies in a step too long to
-    resolve it.
-
-    Only closed pairs count where steps end at switches.
-    """
-    row, closed = 0, clock.across == 0.0
+    resolve it."""
+    row = 0
     while row < work.tally.candidates:
         end = pair_end(work, row)
-        old = overtaken_contact(work, row, end, closed)
-        if old >= 0:
+        old, new = least_row(work, NOW, row, end), least_row(work, NEW, row, end)
+        if overtakes(work, old, new):
             view = contact_view(scene, work, NOW, old)
             stiffness = secant_stiffness(scene, view, clock.tolerance)
             # h ω0 > RESOLVED_PHASE.

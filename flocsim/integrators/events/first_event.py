@@ -107,11 +107,6 @@ def switch_share(scene, work, observed, clock, step):
     return math.inf
 
 
-UNCHANGED, FRICTION_CHANGED, CONTACTS_CHANGED = range(3)
-"""What changed when modes were set: nothing; sticking and sliding, by which no force jumps; or
-which pairs touch."""
-
-
 def set_closed(work, state=NOW):
     """Flag every listed pair as open or closed by its gap in a state, except those that graze;
     return True if any has changed."""
@@ -128,9 +123,7 @@ def set_closed(work, state=NOW):
 
 
 def set_modes(scene, work):
-    """Set the mode of every listed pair from its present gap and slip; return what changed
-    (UNCHANGED, …)."""
+    """Set the mode of every listed pair from its present gap and slip; return True if any has
+    changed."""
     contacts, friction = set_closed(work), set_sliding(scene, work)
-    if contacts:
-        return CONTACTS_CHANGED
-    return FRICTION_CHANGED if friction else UNCHANGED
+    return contacts or friction

@@ -118,22 +118,6 @@ def start_grazing(scene, work, row):
     contact.newly_grazing = 1.0
 
 
-def equalise_forces(work):
-    """Give all grazing rows of one contact point the mean of their forces."""
-    # grazing_resistance stores the means until all are known.
-    for row in range(work.tally.candidates):
-        if work.candidates[row].contact_mode == GRAZING:
-            total, count = 0.0, 0
-            for other in range(work.tally.candidates):
-                if work.candidates[other].contact_mode == GRAZING and coincides(work, row, other):
-                    total, count = total + work.contacts[other].grazing_force, count + 1
-            work.contacts[row].grazing_resistance = total / max(count, 1)
-    for row in range(work.tally.candidates):
-        if work.candidates[row].contact_mode == GRAZING:
-            contact = work.contacts[row]
-            contact.grazing_force = contact.grazing_resistance
-
-
 def redefine_gap(work, row, gap):
     """Let the present gap of a pair count as ``gap`` [m]; the difference is stored as an offset."""
     geometry = work.geometry[NOW, row]
@@ -255,17 +239,6 @@ def track_flight(work, clock, row):
         contact.short_flights = 0.0
 
 
-def handle_release(scene, work, clock, row):
-    """Let a closed pair that has parted begin to graze if it can; return True if it does."""
-    if not begins_grazing(scene, work, clock, row):
-        return False
-    # All rows of the contact point graze together.
-    for other in range(work.tally.candidates):
-        if work.candidates[other].contact_mode == CLOSED and coincides(work, row, other):
-            start_grazing(scene, work, other)
-    return True
-
-
 @apart
 def update_grazing_pairs(scene, work, clock, step):
     """Let pairs begin and cease to graze at the end of a step; return True if any has."""
@@ -280,13 +253,16 @@ def update_grazing_pairs(scene, work, clock, step):
             track_flight(work, clock, row)
             if work.geometry[NOW, row].gap < 0.0:
                 count_short_flight(work, clock, step, row)
-    # Closed pairs that have parted may begin to graze.
+    # Closed pairs that have parted may begin to graze, with all rows of their contact point.
     for row in range(work.tally.candidates):
-        if work.candidates[row].contact_mode == CLOSED and work.geometry[NOW, row].gap >= 0.0:
-            entered = handle_release(scene, work, clock, row) or entered
+        parted = work.candidates[row].contact_mode == CLOSED and work.geometry[NOW, row].gap >= 0.0
+        if parted and begins_grazing(scene, work, clock, row):
+            entered = True
+            for other in range(work.tally.candidates):
+                if work.candidates[other].contact_mode == CLOSED and coincides(work, row, other):
+                    start_grazing(scene, work, other)
     # All gaps count as zero from here, so that none is closed by rounding.
     if entered:
-        equalise_forces(work)
         for row in range(work.tally.candidates):
             if work.candidates[row].contact_mode == GRAZING:
                 redefine_gap(work, row, 0.0)

@@ -12,9 +12,12 @@ from flocsim.integrators.rhs.error import at_least_rounding
 from flocsim.integrators.rhs.views import contact_view, normal_rate, velocity_lifetime_of
 
 OVERLAP_FRACTION = 0.02
-"""A touch is located to this fraction of the depth of the impact, speed/ω0, as the rest of bodies
-may depend on far less than the tolerance; while contacts are pressed, switches to this fraction of
-the deepest overlap."""
+"""Where bodies rebound, their touch is located to this fraction of the depth of the impact,
+speed/ω0; while contacts are pressed, switches to this fraction of the deepest overlap."""
+
+SHARE_OF_DAMPED = 0.3
+"""Where they do not, to this fraction: their rest may depend on far less than the tolerance, and a
+touch noticed deeper than the impact gets has a force that the bodies never caused."""
 
 MOST_LATER = 1e3
 """Touches of bodies that rebound and releases are located so finely that the velocity error leads
@@ -42,12 +45,14 @@ def touch_resolution(scene, work, state, row, resolution):
         return resolution
     # ω0 of the contact; speed/ω0 is about the depth of the impact.
     frequency = math.sqrt(stiffness / view.effective_mass)
-    limit = min(resolution, OVERLAP_FRACTION * speed / frequency)
-    # Where they rebound, the velocity error ω0 g displaces the bodies by ω0 g T.
-    if bounces(scene, view, speed, frequency):
-        memory = velocity_lifetime_of(work, row)
-        limit = min(limit, MOST_LATER * resolution / max(frequency * memory, TINY))
-    return at_least_rounding(work, state, limit)
+    # Inelastic: a fraction of the depth of the impact.
+    if not bounces(scene, view, speed, frequency):
+        return at_least_rounding(work, state, min(resolution, SHARE_OF_DAMPED * speed / frequency))
+    # Elastic: a smaller one, and the velocity error ω0 g displaces the bodies by ω0 g T.
+    by_lifetime = MOST_LATER * resolution / max(frequency * velocity_lifetime_of(work, row), TINY)
+    return at_least_rounding(
+        work, state, min(resolution, OVERLAP_FRACTION * speed / frequency, by_lifetime)
+    )
 
 
 def release_resolution(scene, work, state, row, resolution):

@@ -39,9 +39,6 @@ from flocsim.integrators.events.crossings import (
     passes_through_reach,
 )
 from flocsim.integrators.events.first_event import (
-    CONTACTS_CHANGED,
-    FRICTION_CHANGED,
-    UNCHANGED,
     first_law_share,
     set_modes,
     switch_resolutions,
@@ -62,9 +59,6 @@ from flocsim.integrators.loop.step_size import (
     plan,
     reject,
     representable_step,
-    step_behind_touch,
-    step_to_switch,
-    vibration_step,
 )
 from flocsim.integrators.rhs.forces import copy_motion
 from flocsim.integrators.rhs.friction import rolled, slip_in, slip_rate_of_gap_change
@@ -100,7 +94,7 @@ def adopt_new_state(work):
 @apart
 def accept(scene, work, clock, counts, step, lists):
     """Accept the step: adopt the new state, propagate errors and set the modes of all pairs. Return
-    what has switched (UNCHANGED, FRICTION_CHANGED or CONTACTS_CHANGED)."""
+    True if a contact has switched."""
     adopt_new_state(work)
     clock.time += step
     snap_to_kick_end(scene, work, clock)
@@ -112,7 +106,7 @@ def accept(scene, work, clock, counts, step, lists):
     if across:
         note_rates(work, clock, step)
     if not lists:
-        return UNCHANGED
+        return False
     if controlled and has(scene, CONTACT_FORCE):
         # Steps across switches locate none, so they have no such errors.
         if not across:
@@ -124,9 +118,7 @@ def accept(scene, work, clock, counts, step, lists):
     # A contact that rolls from one edge to the next hands its tangential displacement on.
     transfer_slips(scene, work)
     switched = set_modes(scene, work)
-    if across:
-        return UNCHANGED
-    return FRICTION_CHANGED if grazes and switched == UNCHANGED else switched
+    return not across and (grazes or switched)
 
 
 def plan_flight(work, clock, planned, was_flying):
@@ -302,7 +294,7 @@ def advance(scene, work, observed, clock, counts, record):
         if share < 1.0 and trials < MOST_TRIALS:
             trials += 1
             if not ends_early(scene, work, clock, step, ratio, share):
-                limit = step_to_switch(scene, work, step, share)
+                limit = share * step
                 counts.located += 1
                 continue
             step *= share
@@ -311,17 +303,9 @@ def advance(scene, work, observed, clock, counts, record):
         planned = clock.step
         switched = accept(scene, work, clock, counts, step, lists)
         # 5. Plan the next step.
-        plan(clock, step, ratio, trials > 0, switched)
-        if switched == CONTACTS_CHANGED and work.tally.kind == SERIES:
+        plan(scene, work, clock, step, ratio, trials > 0, switched)
+        if switched and work.tally.kind == SERIES:
             plan_flight(work, clock, planned, was_flying)
-        if trials > 0 and switched == UNCHANGED:
-            # After a kink the Jacobian may be that from before it.
-            clock.second_iteration_rate = 0.0
-        if switched != UNCHANGED:
-            # After a switch: long enough to resolve the fastest vibration, short enough for the
-            # impact.
-            clock.step = max(clock.step, vibration_step(scene, work))
-            clock.step = min(clock.step, step_behind_touch(scene, work, clock))
         limit, trials = math.inf, 0
         status = record_and_observe(scene, work, observed, clock, counts, record, lists)
         if status != 0:

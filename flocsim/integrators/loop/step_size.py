@@ -11,43 +11,20 @@ closed instead, since the forces are new.
 
 import math
 
-from flocsim.constants import TINY
 from flocsim.geometry.contact.candidates import spendable_share, time_to_spend
 from flocsim.hooks import next_step
-from flocsim.integrators.events.first_event import (
-    CONTACTS_CHANGED,
-    FRICTION_CHANGED,
-    switch_resolutions,
-)
-from flocsim.integrators.events.resolution import touch_resolution
-from flocsim.integrators.exponential.collocation import may_be_series
 from flocsim.integrators.loop.kicks import kick_end
 from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
-from flocsim.integrators.rhs.views import contact_view, inertia, normal_rate, velocity_lifetime_of
-from flocsim.state.clock import PLAIN, RADAU
+from flocsim.integrators.rhs.views import contact_view, normal_rate, velocity_lifetime_of
+from flocsim.state.clock import PLAIN
 from flocsim.state.contacts import CLOSED
-from flocsim.state.work import MOST_IN_SERIES, NOW, STIFFNESS
+from flocsim.state.work import MOST_IN_SERIES, NOW
 
 SAFETY = 0.9
 """Fraction of the step at which the error would just meet the tolerance."""
 
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.1, 8.0
 """Bounds of the change from one step to the next."""
-
-LOWEST_ORDER = 0.5
-"""Lower bound of the observed order: behind a switch, errors may hardly fall with the step."""
-
-
-def observed_order(clock, step, ratio, order):
-    """Return the order p of error ∝ h^p from two rejected trials in a row, at most ``order``.
-
-    Behind a switch stiff forces settle, and the error falls far more slowly than the order of the
-    method says (Gustafsson 1994).
-    """
-    if clock.rejected_step <= step:
-        return order
-    decay = math.log(clock.rejected_ratio / ratio) / math.log(clock.rejected_step / step)
-    return min(max(decay, LOWEST_ORDER), order)
 
 
 def adaptive_factor(clock, step, ratio, order):
@@ -59,8 +36,6 @@ def adaptive_factor(clock, step, ratio, order):
     Differential Equations II, IV.8).
     """
     ratio = max(ratio, 1e-12)
-    if ratio > 1.0:
-        order = observed_order(clock, step, ratio, order)
     # Elementary controller: error ∝ h^p.
     factor = SAFETY * ratio ** (-1.0 / order)
     before = clock.previous_step
@@ -82,48 +57,14 @@ LEAST_ADVANCE = 2.3e-16
 """A step of this fraction of the time is the shortest that changes the time in double precision;
 switches closer together than that count as simultaneous."""
 
-RESOLVED = 0.02
-"""A step of this fraction of 1/ω0 resolves a vibration."""
-
-IMMINENT = 0.05
-"""A touch expected within this fraction of the step gets a step of its own."""
-
 FRACTION_OF_FAILED, RECOVERY = 0.6, 2.0
 """After a failed step, the next ones are at most this fraction of it; the bound then grows by
 RECOVERY per step."""
-
-GROWTH_AFTER_SWITCH = 3.0
-"""The first step after a switch is at most this multiple of the one after the switch before."""
-
-LONGEST_SWITCH_STREAK = 4.0
-"""Steps in a row that end at a switch before they may grow all the same."""
 
 TOUCH_ERROR_FRACTION = 0.1
 """The error of the first step after a touch is taken as (h ω0)⁴ over this times the displacement
 that the impact leads to; that of a series as (h ω0)⁵ over this times the overlap v/ω0 of the
 impact, for the rotation of the contact normal, which the series does not contain."""
-
-MAX_PHASE = 4.0
-"""Phase ω h [rad], ω being the fastest vibration, up to which the events inside a series are found
-reliably. A Radau step with an event in it is repeated as a series of this length."""
-
-
-def step_to_imminent_touch(scene, work, clock, step):
-    """Return the step, or the much shorter one after which a pair is about to switch."""
-    resolution, _ = switch_resolutions(work, clock)
-    for row in range(work.tally.candidates):
-        gap = work.geometry[NOW, row].gap
-        if 0.0 <= gap < clock.tolerance:
-            rate = normal_rate(work, NOW, row)
-            # Linear extrapolation; aim half the resolution past the touch, so that the pair is
-            # closed then.
-            if gap * rate < 0.0:
-                overshoot = 0.5 * touch_resolution(scene, work, NOW, row, resolution)
-                ahead = (abs(gap) + overshoot) / abs(rate)
-                if ahead < IMMINENT * step:
-                    step = ahead
-    return step
-
 
 LANDING_MARGIN, LANDING_FRACTION = 0.05, 0.5
 """A step across switches ends LANDING_MARGIN tolerances before a pair lands in it; the step that
@@ -154,12 +95,9 @@ def choose_step(scene, work, clock, lists):
     # Lists: no pair may use up its motion budget.
     if lists:
         step = min(step, time_to_spend(scene, work, spendable_share(scene, work)))
-        # Contacts: end at an imminent touch, or just before a landing.
-        if clock.tolerance < math.inf:
-            if clock.across == 0.0:
-                step = step_to_imminent_touch(scene, work, clock, step)
-            else:
-                step = step_to_landing(work, clock, step)
+        # Steps across switches end just before a landing.
+        if clock.across == 1.0:
+            step = step_to_landing(work, clock, step)
     # Stops and thermal kicks end a step exactly.
     remaining = min(clock.until, kick_end(scene, work)) - clock.time
     # Two even steps at the end instead of a long one and a sliver.
@@ -192,30 +130,11 @@ def reject(clock, counts, step, ratio, too_far):
     # A failure carries no information about the error: quarter the step.
     clock.step = 0.25 * step if failed else next_step(clock, step, ratio)
     clock.rejected_step = 0.0 if failed else step
-    clock.rejected_ratio = ratio
     # Failed steps bound the next ones. So do rejected steps across switches: a contact that
     # switches late in the step makes the error jump, and would do so again.
     if ratio < 0.0 or (clock.across == 1.0 and not too_far):
         clock.feasible_step = FRACTION_OF_FAILED * step
     return moves(clock, step)
-
-
-def fastest_vibration(scene, work):
-    """Return the angular frequency of the fastest vibration [1/s], 0 if nothing vibrates."""
-    stiffest = 0.0
-    for body in range(work.poses.shape[0]):
-        if scene.bodies[body].free == 1.0:
-            # Diagonal of M⁻¹K: ω² of each coordinate alone.
-            for axis in range(3):
-                mass = max(inertia(scene, body, axis), TINY)
-                stiffest = max(stiffest, work.jacobian[STIFFNESS, body, axis, axis] / mass)
-    return math.sqrt(stiffest)
-
-
-def vibration_step(scene, work):
-    """Return the step that resolves the fastest vibration [s]; 0 if nothing vibrates."""
-    fastest = fastest_vibration(scene, work)
-    return RESOLVED / fastest if fastest > 0.0 else 0.0
 
 
 def step_behind_touch(scene, work, clock):
@@ -244,45 +163,22 @@ def step_behind_touch(scene, work, clock):
     return (allowed * frequency / top_speed) ** 0.2 / frequency
 
 
-def step_to_switch(scene, work, step, share):
-    """Return the step [s] to try after one that passed an event at a fraction of it.
-
-    A Radau step damps vibrations, and the event may be an artefact of that. Then a series is tried
-    instead, as long as MAX_PHASE allows, but at most half of the step.
-    """
-    fastest = fastest_vibration(scene, work)
-    if work.tally.kind != RADAU or not may_be_series(scene, work) or fastest == 0.0:
-        return share * step
-    return max(share * step, min(0.5 * step, MAX_PHASE / fastest))
-
-
-def plan(clock, step, ratio, was_cut, switched):
+def plan(scene, work, clock, step, ratio, was_cut, switched):
     """Plan the size of the step after an accepted one. ``was_cut`` is True if the step was meant to
-    end at a switch, ``switched`` what has switched in it."""
-    if switched == CONTACTS_CHANGED:
-        # The forces are new, and settle about as fast as after the last switch.
+    end at a switch, ``switched`` if a contact has switched at its end."""
+    if switched:
+        # The forces are new.
         clock.previous_step = math.inf
         clock.stages_step = 0.0
-        clock.switch_streak += 1.0
-        if clock.switch_streak > LONGEST_SWITCH_STREAK and not was_cut:
-            # A pair on the verge of touching switches step after step; steps have to grow all the
-            # same.
-            clock.step = min(next_step(clock, step, ratio), clock.feasible_step)
-            clock.step_after_switch = max(clock.step_after_switch, step)
-        clock.step = min(clock.step, GROWTH_AFTER_SWITCH * clock.step_after_switch)
-    elif switched == FRICTION_CHANGED:
-        clock.previous_step = math.inf
-        clock.stages_step = 0.0
+        clock.step = min(clock.step, step_behind_touch(scene, work, clock))
     elif was_cut:
-        # The switch did not come: the step was too long to predict it.
+        # The switch did not come: the step was too long to predict it. Or it was a kink: then the
+        # convergence rate may be that from before it.
         clock.previous_step = math.inf
         clock.feasible_step = FRACTION_OF_FAILED * clock.step
         clock.step = min(clock.feasible_step, LARGEST_FACTOR * step)
+        clock.second_iteration_rate = 0.0
     else:
-        # The first step without a switch tells how fast forces settle after one.
-        if clock.switch_streak > 0.0:
-            clock.step_after_switch = step
-            clock.switch_streak = 0.0
         # A step shortened by lists or stops says nothing about the trend of the error.
         cut = step < 0.5 * clock.step
         clock.step = min(next_step(clock, step, ratio), clock.feasible_step)

@@ -69,11 +69,8 @@ def oriented_forces_at(scene, time, j, i, x, y, angle_j, angle_i):
     of_i -= energy_at(scene, time, j, i, distance, one - ANGLE_DIFFERENCE, other)
     of_j = energy_at(scene, time, j, i, distance, one, other + ANGLE_DIFFERENCE)
     of_j -= energy_at(scene, time, j, i, distance, one, other - ANGLE_DIFFERENCE)
-    along, torque_i, torque_j = (
-        -0.5 * rise / by,
-        -0.5 * of_i / ANGLE_DIFFERENCE,
-        -0.5 * of_j / ANGLE_DIFFERENCE,
-    )
+    along, torques = -0.5 * rise / by, -0.5 / ANGLE_DIFFERENCE
+    torque_i, torque_j = torques * of_i, torques * of_j
     # Balance of torques about i.
     across = -(torque_i + torque_j) / distance
     nx, ny = x / distance, y / distance

@@ -40,14 +40,6 @@ def displacement_bound(work, body):
     )
 
 
-def take_over_excess(work, body, size):
-    """Add to a body's own error whatever its propagated error ``size`` [m] exceeds its bound by: an
-    error that other bodies have handed on."""
-    more = size - displacement_bound(work, body)
-    if more > 0.0:
-        work.errors[body].displacement += more
-
-
 def scale_down_clusters(scene, work):
     """Scale the propagated error of every cluster of contacting bodies down to its bound.
 
@@ -92,7 +84,8 @@ def bound_propagated(scene, work):
     scale_down_clusters(scene, work)
     for body in range(work.poses.shape[0]):
         size = outline_size(scene, work.place, PROPAGATED, body)
-        take_over_excess(work, body, size)
+        # What it still exceeds its bound by is an error that other bodies have handed on.
+        work.errors[body].displacement += max(size - displacement_bound(work, body), 0.0)
         largest = max(largest, size)
     return largest
 
