@@ -157,7 +157,7 @@ class Implicit(Integrator):
             factor = min(factor, (TARGET_RATE / clock.convergence_rate) ** 0.5)
         factor = max(factor, SMALLEST_FACTOR)
         # Stay with steps that can be a series. Where Radau would be accurate enough for longer
-        # ones, judge_series has raised this limit.
+        # ones, exponential.series.expand has raised this limit.
         if ratio <= 1.0:
             return max(min(step * factor, clock.longest_series), min(step, step * factor))
         return step * factor

@@ -70,7 +70,7 @@ TERMS = 44
 # The series in ``Work.series``, and the nonlinear forces behind them in ``Work.remainder``.
 (
     MOTION,  # the motion in the step
-    CHANGED,  # a small change of it, by an iteration or an error
+    CHANGED,  # a small change of it, by an error
 ) = range(2)
 
 
@@ -123,7 +123,7 @@ class Work(NamedTuple):
     series: Annotated[np.ndarray, (2, TERMS, "few", 3)]  # terms of a motion, see MOTION [m, rad]
     remainder: Annotated[np.ndarray, (2, 4, "few", 3)]  # R₀, r₁, r₂, r₃ of its force [N, N m]
     weights: Annotated[np.ndarray, (2, "few", 3)]  # see MOVED
-    linear: Annotated[np.ndarray, (2, "few", "few", 3, 3)]  # h²K/M and h D/M, see DAMPING
+    linear: Annotated[np.ndarray, (2, "few", "few", 3, 3)]  # D/h and K, see DAMPING
     slip: Annotated[np.ndarray, (STATES, "rows")]  # tangential displacements ξ [m]
     slip_rate: Annotated[np.ndarray, (STATES, "rows")]  # their rates [m/s]
     contacts: Annotated[np.ndarray, ("rows",), ContactState]
