@@ -34,14 +34,12 @@ from flocsim.bonds.certificate import (
     NO_BOND,
     REST,
     are_spheres,
-    can_leave,
     capacity,
     is_closed,
-    radii_of,
     resting_contact,
     smaller_bounding_radius,
 )
-from flocsim.bonds.escape import BARRIER
+from flocsim.bonds.escape import BARRIER, can_escape, radii_of
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import contact_point
 from flocsim.hooks import CONTACT_FORCE, SLIP_LIMIT, contact_force, has, slip_limit
@@ -101,7 +99,7 @@ def outlasts_kicks(scene, work, time, bond, load):
         radii = scene.bodies[bond.i].radius, scene.bodies[bond.j].radius
         # The energy to lift a shape by the smaller spheroradius against the load.
         return load.force > 0.0 and load.force * min(radii[0], radii[1]) >= barrier
-    return load.force > 0.0 and not can_leave(scene, work, time, bond, load.force, barrier)
+    return load.force > 0.0 and not can_escape(scene, work, time, bond, load.force, barrier)
 
 
 def kind_at_rest(scene, work, time, bond, load, rested):

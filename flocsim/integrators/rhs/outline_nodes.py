@@ -234,17 +234,11 @@ def next_bend(scene, work, piece, foot, scale, low, last, gap):
         else:
             # Where two faces meet in a reflex corner: on the bisector of their normals.
             next_piece = piece_at(scene.pieces, near.around[1 + (j + 1) % count])
-            x, y = (
-                other.x + other.half * other.direction_x,
-                other.y + other.half * other.direction_y,
-            )
-            dx = next_piece.x - next_piece.half * next_piece.direction_x - x
-            dy = next_piece.y - next_piece.half * next_piece.direction_y - y
+            x, y, nx, ny, _ = at_parameter(other, other.half)
+            x_2, y_2, nx_2, ny_2, _ = at_parameter(next_piece, -next_piece.half)
+            dx, dy = x_2 - x, y_2 - y
             if next_piece.arc_radius == 0.0 and dx * dx + dy * dy < 1e-12 * other.half * other.half:
-                nx, ny = (
-                    other.direction_y + next_piece.direction_y,
-                    -other.direction_x - next_piece.direction_x,
-                )
+                nx, ny = nx + nx_2, ny + ny_2
                 length = math.sqrt(nx * nx + ny * ny)
                 bend_parameter = ray_parameter(piece, x, y, (nx / length, ny / length), gap)
                 bend = earlier_bend(bend_parameter, foot, scale, low, bend)

@@ -29,7 +29,7 @@ from flocsim.hooks import ORIENTED_ENERGY, OUTLINE_PRESSURE, has, hook, outline_
 from flocsim.integrators.rhs.charge_sum import sum_charges
 from flocsim.integrators.rhs.orientation import oriented_forces_at
 from flocsim.integrators.rhs.outline_nodes import MOST_PANELS, find_feet, gap_expansion, write_side
-from flocsim.integrators.rhs.views import effective_mass
+from flocsim.integrators.rhs.views import centre_line, effective_mass
 from flocsim.state.bodies import ANGLE
 from flocsim.state.outlines import (
     MOST_NODES,
@@ -279,12 +279,11 @@ def sum_pressure(scene, work, time, a, b, x, y, cosine, sine):
             growth = gap_expansion(scene, work, piece, foot)
             low = first if k == 0 else 0.5 * (work.feet[k - 1] + foot)
             high = last if k == feet - 1 else 0.5 * (work.feet[k + 1] + foot)
-            if low < foot:
-                count = write_side(scene, work, count, piece, foot, growth, low, inset, lens, least)
-            if foot < high:
-                count = write_side(
-                    scene, work, count, piece, foot, growth, high, inset, lens, least
-                )
+            for end in (low, high):
+                if end != foot:
+                    count = write_side(
+                        scene, work, count, piece, foot, growth, end, inset, lens, least
+                    )
             # Work in batches of at most MOST_NODES.
             if count > MOST_NODES - 2 * MOST_PANELS * MOST_ORDER:
                 total = sum_nodes(scene, work, total, count, setup)
@@ -345,12 +344,10 @@ def forces_in_frame(scene, work, time, a, b, x, y, angle_a, angle_b):
 def outline_repulsion(scene, work, time, a, b, displacement):
     """Return the repulsion of two bodies along the line of centres [N], with a moved out along it
     by ``displacement`` [m]."""
-    x, y = separation(scene, work, NOW, a, b)
-    distance = length_of(x, y)
-    nx, ny = (x / distance, y / distance) if distance > 0.0 else (0.0, 1.0)
+    nx, ny, distance = centre_line(scene, work, NOW, a, b)
     angle_a, angle_b = work.place[NOW, a, ANGLE], work.place[NOW, b, ANGLE]
     # Move a out, keeping its orientation.
-    x, y = x + displacement * nx, y + displacement * ny
+    x, y = (distance + displacement) * nx, (distance + displacement) * ny
     fx, fy, _, _ = outline_forces_at(scene, work, time, a, b, x, y, angle_a, angle_b)
     return fx * nx + fy * ny
 
