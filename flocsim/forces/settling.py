@@ -30,11 +30,12 @@ def no_force(view, parameters):
 
 def lone_view(system, body):
     """Return the BodyView of a body at rest at the origin."""
-    shape = body.shape
-    return BodyView(
-        0.0, 0.0, 0.0, body.angle, 0.0, 0.0, 0.0, body.mass, body.buoyant_mass(system.fluid),
-        body.inertia, shape.equivalent_radius, shape.elongation, shape.long_axis, 0.0, 0.0, 0.0,
-        *drag.resistance_numbers(system.forces, body),
+    shape, zeros = body.shape, [0.0] * BodyView._fields.index("resistance_xx")
+    view = BodyView(*zeros, *drag.resistance_numbers(system.forces, body))
+    return view._replace(
+        angle=body.angle, mass=body.mass, buoyant_mass=body.buoyant_mass(system.fluid),
+        inertia=body.inertia, radius=shape.equivalent_radius, elongation=shape.elongation,
+        long_axis=shape.long_axis,
     )  # fmt: skip
 
 

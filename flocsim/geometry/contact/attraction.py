@@ -46,13 +46,8 @@ from flocsim.geometry.shapes.pieces import (
     placed,
 )
 
-# Gauss–Legendre rule with eight nodes on [−1, 1].
-GAUSS_EIGHT = (
-    (-0.9602898564975363, 0.10122853629037626), (-0.7966664774136267, 0.22238103445337448),
-    (-0.525532409916329, 0.31370664587788727), (-0.1834346424956498, 0.362683783378362),
-    (0.1834346424956498, 0.362683783378362), (0.525532409916329, 0.31370664587788727),
-    (0.7966664774136267, 0.22238103445337448), (0.9602898564975363, 0.10122853629037626),
-)  # fmt: skip
+ARC_ORDER = 8
+"""Nodes of Gauss's rule for an arc that its series cannot have."""
 
 NO_ATTRACTION = 1e3
 """Plate gap [m] that stands for no attraction."""
@@ -67,8 +62,6 @@ ROOT_SERIES = (1.0, 0.5, 0.375, 0.3125, 0.2734375, 0.24609375)
 CUBE_ROOT = (2.48719599, -4.51910029, 4.92375927, -1.86079247)
 """Coefficients of r^{−1/3} in powers of r, within 4 % for r from 0.1 to 1.25: start of an
 iteration."""
-
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 PANEL = 2.0 / 3.0
 """Panel over the distance of its beginning from where the integrand peaks: its pole is then two
@@ -119,10 +112,11 @@ def add_segment(nodes, count, piece, inset, lens):
         nodes.attraction[k] -= found if (low < high) & (p != 0.0) else 0.0
 
 
-def arc_by_gauss(x, y, piece, radius, lens):
+def arc_by_gauss(x, y, rules, piece, radius, lens):
     """Return S of an arc by Gauss's rule; x, y as seen from its centre."""
     total = 0.0
-    for node, weight in GAUSS_EIGHT:
+    for k in range(ARC_ORDER):
+        node, weight = rules[ARC_ORDER, 0, k], rules[ARC_ORDER, 1, k]
         # The arc is parametrised by t = tan(φ/2) from its middle.
         t = piece.half * node
         denominator = 1.0 + t * t
@@ -202,7 +196,7 @@ def chord_to(x, y, distance, radius, end):
 
 
 @loops_apart
-def add_arc(nodes, count, piece, inset, lens):
+def add_arc(nodes, rules, count, piece, inset, lens):
     """Add S of an arc to each of ``count`` nodes, as `add_segment` does for a segment."""
     start, end = arc_ends(piece)
     radius = max(piece.arc_radius - inset, 0.5 * piece.arc_radius)
@@ -230,7 +224,7 @@ def add_arc(nodes, count, piece, inset, lens):
     for k in range(count):
         if nodes.log_of[k] < 0.0:
             x, y = nodes.x[k] - piece.x, nodes.y[k] - piece.y
-            nodes.attraction[k] += arc_by_gauss(x, y, piece, radius, lens)
+            nodes.attraction[k] += arc_by_gauss(x, y, rules, piece, radius, lens)
         elif nodes.log_share[k] != 0.0:
             log = math.log(nodes.log_of[k])
             nodes.attraction[k] += nodes.log_share[k] * log
@@ -368,7 +362,7 @@ def attraction_energy(
     -----
     Pairwise summation of −C/r⁶ (Hamaker 1937); equations at the top of the module.
     """
-    rule = np.array([NODES, WEIGHTS])
+    rule = np.array(np.polynomial.legendre.leggauss(12))
     x, y, angle = (float(each) for each in pose)
     total = compiled(sum_of_pairs)(pieces_a, pieces_b, x, y, angle, float(depth), rule)
     return hamaker / (24.0 * math.pi) * total * (1.0 if depth == math.inf else depth)

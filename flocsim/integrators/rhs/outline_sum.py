@@ -151,7 +151,7 @@ def evaluate_nodes(scene, work, count, inset, lens):
     for j in range(near.seen[0]):
         piece = piece_at(scene.pieces, near.seen[1 + j])
         if piece.arc_radius > 0.0:
-            add_arc(work.nodes, count, piece, inset, lens)
+            add_arc(work.nodes, work.rules, count, piece, inset, lens)
         else:
             add_segment(work.nodes, count, piece, inset, lens)
     convert_to_plate_gaps(work.nodes, count, inset, lens)
@@ -159,7 +159,7 @@ def evaluate_nodes(scene, work, count, inset, lens):
 
 def sum_nodes(scene, work, total, count, setup):
     """Add (fx, fy, torque about the origin) of the first ``count`` nodes to a total."""
-    inset, lens, view = setup
+    time, inset, lens, _, sizes = setup
     fx, fy, torque = total
     nodes = work.nodes
     # Pad to whole vectors with copies of the last node, which the sum skips.
@@ -174,10 +174,7 @@ def sum_nodes(scene, work, total, count, setup):
             parted, plates = gap + inset, nodes.plate_gap[k]
             # The more an outline curves away, the nearer is all that attracts. For circles this gap
             # gives the fraction lost to a finite depth within 1 %, up to a gap of a third of it.
-            point = OutlineView(
-                view.time, gap, parted, plates, parted * parted / plates, view.depth, view.radius_i,
-                view.radius_j, view.reduced_radius, view.effective_mass,
-            )  # fmt: skip
+            point = OutlineView(time, gap, parted, plates, parted * parted / plates, *sizes)
             size = -outline_pressure(scene, point) * nodes.weight[k]
             x, y = nodes.x[k], nodes.y[k]
             across, up = size * nodes.normal_x[k], size * nodes.normal_y[k]
@@ -220,10 +217,11 @@ def lens_radius(scene, least):
 
 
 def prepare_sum(scene, work, time, a, b, pose):
-    """Return (inset, lens, OutlineView) of body a in a Pose; list the pieces within the lens.
+    """Return (time, inset, lens, least gap, sizes) of body a in a Pose; list the pieces within the
+    lens.
 
     ``lens`` is 0 if nothing acts. ``inset`` [m] is how far outlines nearer than d_min are moved
-    apart.
+    apart; ``sizes`` are the last fields of an OutlineView.
     """
     reach, floor, _, _ = scene.outlines
     # Lists are a superset of what counts, so when they were made does not affect the sum.
@@ -240,11 +238,9 @@ def prepare_sum(scene, work, time, a, b, pose):
         if lens > 0.0:
             list_near_pieces(scene, work, a, b, pose, (1.0 + SKIN) * lens)
     radius_a, radius_b = radii_of(scene, a, b)
-    view = OutlineView(
-        time, least, least, least, least, depth_of(scene, a, b), radius_a, radius_b,
-        radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
-    )  # fmt: skip
-    return max(0.0, floor - least), lens, view
+    reduced = radius_a * radius_b / (radius_a + radius_b)
+    sizes = depth_of(scene, a, b), radius_a, radius_b, reduced, effective_mass(scene, a, b)
+    return time, max(0.0, floor - least), lens, least, sizes
 
 
 def out_of_reach(scene, a, b, pose):
@@ -263,10 +259,10 @@ def sum_pressure(scene, work, time, a, b, x, y, cosine, sine):
     if out_of_reach(scene, a, b, pose):
         return total
     setup = prepare_sum(scene, work, time, a, b, pose)
-    inset, lens, view = setup
+    _, inset, lens, least_gap, sizes = setup
     if lens == 0.0:
         return total
-    count, least, work.near.seen[0] = 0, view.gap + inset, 0
+    count, least, work.near.seen[0] = 0, least_gap + inset, 0
     for i in range(work.near.first[0]):
         piece = placed(scene.pieces, work.near.first[1 + i], pose)
         if list_around_piece(scene, work, piece, lens) == 0:
@@ -289,7 +285,7 @@ def sum_pressure(scene, work, time, a, b, x, y, cosine, sine):
                 total = sum_nodes(scene, work, total, count, setup)
                 count = 0
     fx, fy, torque = sum_nodes(scene, work, total, count, setup)
-    return view.depth * fx, view.depth * fy, view.depth * torque
+    return sizes[0] * fx, sizes[0] * fy, sizes[0] * torque
 
 
 def outline_forces_at(scene, work, time, a, b, x, y, angle_a, angle_b):

@@ -84,32 +84,25 @@ def write_row(work, row, direction, one, two, load):
     s[row, 2], s[row, 5], s[row, LOAD] = one[2], two[2], load
 
 
-def row_times(work, row, motion):
-    """Return q·v of a row and velocities (6,)."""
-    s = work.squares
-    return (
-        s[row, 0] * motion[0] + s[row, 1] * motion[1] + s[row, 2] * motion[2]
-        + s[row, 3] * motion[3] + s[row, 4] * motion[4] + s[row, 5] * motion[5]
-    )  # fmt: skip
+def row_times(work, row, one, two):
+    """Return q·v of a row and the velocities (v_x, v_y, spin) of body 1 and of body 2."""
+    s, total = work.squares, 0.0
+    for k in range(3):
+        total += s[row, k] * one[k] + s[row, 3 + k] * two[k]
+    return total
 
 
-def motion_in(work, state, one, two):
-    """Return (v_x, v_y, spin) of both bodies in a state."""
+def velocity_in(work, state, body):
+    """Return (v_x, v_y, spin) of a body in a state."""
     v = work.velocity
-    return (
-        v[state, one, X], v[state, one, Y], v[state, one, ANGLE],
-        v[state, two, X], v[state, two, Y], v[state, two, ANGLE],
-    )  # fmt: skip
+    return v[state, body, X], v[state, body, Y], v[state, body, ANGLE]
 
 
-def relative_to_flow(scene, work, state, one, two, motion):
-    """Return the same relative to the flow at each body."""
-    u, v, spin = flow_in(scene, work, state, one)
-    u_2, v_2, _ = flow_in(scene, work, state, two)
-    return (
-        motion[0] - u, motion[1] - v, motion[2] - spin,
-        motion[3] - u_2, motion[4] - v_2, motion[5] - spin,
-    )  # fmt: skip
+def relative_to_flow(scene, work, state, body):
+    """Return the same relative to the flow at the body."""
+    vx, vy, spin = velocity_in(work, state, body)
+    u, v, turning = flow_in(scene, work, state, body)
+    return vx - u, vy - v, spin - turning
 
 
 def flow_in(scene, work, state, body):
@@ -240,20 +233,20 @@ def add_pair_resistance(scene, work, state):
         far, _ = write_squares(scene, work, state, one, two)
         if far == 0.0:
             continue
-        motion = motion_in(work, state, one, two)
-        against = relative_to_flow(scene, work, state, one, two, motion)
-        (drag, turn), (drag_2, turn_2) = sphere_drag(scene, one), sphere_drag(scene, two)
+        motion, motion_2 = velocity_in(work, state, one), velocity_in(work, state, two)
+        against = relative_to_flow(scene, work, state, one)
+        against_2 = relative_to_flow(scene, work, state, two)
         # The tables hold the whole resistance: take each body's own Stokes drag off.
-        drag, turn, drag_2, turn_2 = far * drag, far * turn, far * drag_2, far * turn_2
-        add_force(work, state, one, drag * against[0], drag * against[1], turn * against[2])
-        add_force(work, state, two, drag_2 * against[3], drag_2 * against[4], turn_2 * against[5])
+        for body, (vx, vy, spin) in ((one, against), (two, against_2)):
+            drag, turn = sphere_drag(scene, body)
+            add_force(work, state, body, far * drag * vx, far * drag * vy, far * turn * spin)
         for row in range(SQUARES + 1):
             # Tension counts as it is.
             size = far
             if row < RELATIVE:
-                size *= s[row, LOAD] - row_times(work, row, against)
+                size *= s[row, LOAD] - row_times(work, row, against, against_2)
             elif row < TENSION:
-                size *= -row_times(work, row, motion)
+                size *= -row_times(work, row, motion, motion_2)
             add_force(work, state, one, size * s[row, 0], size * s[row, 1], size * s[row, 2])
             add_force(work, state, two, size * s[row, 3], size * s[row, 4], size * s[row, 5])
 
@@ -274,7 +267,8 @@ def add_pair_damping(scene, work):
         if far == 0.0:
             continue
         blocks = (one, upper_block(work, pair), lower_block(work, pair), two)
-        opening = slope * row_times(work, RELATIVE, motion_in(work, NOW, one, two))
+        motion, motion_2 = velocity_in(work, NOW, one), velocity_in(work, NOW, two)
+        opening = slope * row_times(work, RELATIVE, motion, motion_2)
         # R = Σ q qᵀ, less each body's own drag.
         for row in range(SQUARES):
             add_square(work, DAMPING, blocks, row, far)
