@@ -115,36 +115,16 @@ def parameter_to_gap(scene, work, piece, foot, extent, target):
 def write_nodes(nodes, rules, count, piece, foot, scale, low, high, order):
     """Append the nodes of a panel, t in [low, high], on a piece graded from a foot; see the
     module."""
-    # Loops over few arrays each are vectorised by LLVM.
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     for k in range(order):
         # Gauss's node and weight in t; ds/dt = 2 scale (1 + t²)/(1 − t²)².
         t = middle + half * rules[order, 0, k]
         factor = 1.0 / (1.0 - t * t)
         part = 2.0 * half * rules[order, 1, k] * abs(scale) * (1.0 + t * t) * factor * factor
-        nodes.weight[count + k] = part
-        nodes.attraction[count + k] = foot + 2.0 * scale * t * factor
-    # Segment: the parameter is arc length.
-    if piece.arc_radius == 0.0:
-        for k in range(order):
-            parameter = nodes.attraction[count + k]
-            nodes.x[count + k] = piece.x + parameter * piece.direction_x
-            nodes.y[count + k] = piece.y + parameter * piece.direction_y
-        for k in range(order):
-            nodes.normal_x[count + k] = piece.direction_y
-            nodes.normal_y[count + k] = -piece.direction_x
-    else:
-        for k in range(order):
-            parameter = nodes.attraction[count + k]
-            factor = 1.0 / (1.0 + parameter * parameter)
-            c, s = (1.0 - parameter * parameter) * factor, 2.0 * parameter * factor
-            nodes.normal_x[count + k] = c * piece.direction_x - s * piece.direction_y
-            nodes.normal_y[count + k] = c * piece.direction_y + s * piece.direction_x
-            nodes.weight[count + k] *= 2.0 * piece.arc_radius * factor
-        for k in range(order):
-            nodes.x[count + k] = piece.x + piece.arc_radius * nodes.normal_x[count + k]
-            nodes.y[count + k] = piece.y + piece.arc_radius * nodes.normal_y[count + k]
-    for k in range(order):
+        x, y, nx, ny, metres = at_parameter(piece, foot + 2.0 * scale * t * factor)
+        nodes.x[count + k], nodes.y[count + k] = x, y
+        nodes.normal_x[count + k], nodes.normal_y[count + k] = nx, ny
+        nodes.weight[count + k] = metres * part
         nodes.gap[count + k], nodes.attraction[count + k] = math.inf, 0.0
 
 

@@ -50,9 +50,6 @@ further than (1 + MOST_SKIN) times as far as needed."""
 AT_ORIGIN = Pose(0.0, 0.0, 1.0, 0.0)
 """Pose of the body in whose frame the sum is evaluated."""
 
-VECTOR_WIDTH = 8
-"""Nodes that a processor evaluates in one vector at most."""
-
 
 def list_near_pieces(scene, work, a, b, pose, reach):
     """List the pieces of two bodies that are nearer to each other than ``reach`` [m]."""
@@ -162,12 +159,7 @@ def sum_nodes(scene, work, total, count, setup):
     time, inset, lens, _, sizes = setup
     fx, fy, torque = total
     nodes = work.nodes
-    # Pad to whole vectors with copies of the last node, which the sum skips.
-    whole = -(-count // VECTOR_WIDTH) * VECTOR_WIDTH
-    for k in range(count, whole):
-        nodes.x[k], nodes.y[k] = nodes.x[count - 1], nodes.y[count - 1]
-        nodes.gap[k], nodes.attraction[k] = nodes.gap[count - 1], nodes.attraction[count - 1]
-    evaluate_nodes(scene, work, whole, inset, lens)
+    evaluate_nodes(scene, work, count, inset, lens)
     for k in range(count):
         gap = nodes.gap[k]
         if gap < lens:
