@@ -55,10 +55,9 @@ def list_near_pieces(scene, work, a, b, pose, reach):
     """List the pieces of two bodies that are nearer to each other than ``reach`` [m]."""
     near, listed = work.near, work.listed
     # First against the other body's bounding circle, then piece against piece.
-    list_within(scene.pieces, near.first, scene.first_piece[a], scene.first_piece[a + 1],
-                pose, 0.0, 0.0, scene.bodies[b].bounding_radius + reach)  # fmt: skip
-    list_within(scene.pieces, near.second, scene.first_piece[b], scene.first_piece[b + 1],
-                AT_ORIGIN, pose.x, pose.y, scene.bodies[a].bounding_radius + reach)  # fmt: skip
+    bound_a, bound_b = scene.bodies[a].bounding_radius, scene.bodies[b].bounding_radius
+    list_within(scene, near.first, a, pose, 0.0, 0.0, bound_b + reach)
+    list_within(scene, near.second, b, AT_ORIGIN, pose.x, pose.y, bound_a + reach)
     keep_close_pieces(scene.pieces, near.first, pose, near.second, AT_ORIGIN, reach)
     keep_close_pieces(scene.pieces, near.second, AT_ORIGIN, near.first, pose, reach)
     listed.first_body, listed.second_body, listed.reach = a, b, reach
@@ -66,12 +65,11 @@ def list_near_pieces(scene, work, a, b, pose, reach):
     listed.cosine, listed.sine = pose.cosine, pose.sine
 
 
-def list_within(pieces, rows, first, last, pose, x, y, reach):
-    """List those of the pieces ``first`` to ``last`` of a body in a Pose that may be within
-    ``reach`` of a point [m]."""
+def list_within(scene, rows, body, pose, x, y, reach):
+    """List those pieces of a body in a Pose that may be within ``reach`` of a point [m]."""
     count = 0
-    for row in range(first, last):
-        piece = placed(pieces, row, pose)
+    for row in range(scene.first_piece[body], scene.first_piece[body + 1]):
+        piece = placed(scene.pieces, row, pose)
         dx, dy, most = piece.middle_x - x, piece.middle_y - y, reach + piece.extent
         if dx * dx + dy * dy < most * most:
             count += 1
