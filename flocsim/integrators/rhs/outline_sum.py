@@ -154,7 +154,7 @@ def evaluate_nodes(scene, work, count, inset, lens):
 
 def sum_nodes(scene, work, total, count, setup):
     """Add (fx, fy, torque about the origin) of the first ``count`` nodes to a total."""
-    time, inset, lens, _, sizes = setup
+    inset, lens, _, time, sizes = setup
     fx, fy, torque = total
     nodes = work.nodes
     evaluate_nodes(scene, work, count, inset, lens)
@@ -207,7 +207,7 @@ def lens_radius(scene, least):
 
 
 def prepare_sum(scene, work, time, a, b, pose):
-    """Return (time, inset, lens, least gap, sizes) of body a in a Pose; list the pieces within the
+    """Return (inset, lens, least gap, time, sizes) of body a in a Pose; list the pieces within the
     lens.
 
     ``lens`` is 0 if nothing acts. ``inset`` [m] is how far outlines nearer than d_min are moved
@@ -230,7 +230,7 @@ def prepare_sum(scene, work, time, a, b, pose):
     radius_a, radius_b = radii_of(scene, a, b)
     reduced = radius_a * radius_b / (radius_a + radius_b)
     sizes = depth_of(scene, a, b), radius_a, radius_b, reduced, effective_mass(scene, a, b)
-    return time, max(0.0, floor - least), lens, least, sizes
+    return max(0.0, floor - least), lens, least, time, sizes
 
 
 def out_of_reach(scene, a, b, pose):
@@ -249,7 +249,7 @@ def sum_pressure(scene, work, time, a, b, x, y, cosine, sine):
     if out_of_reach(scene, a, b, pose):
         return total
     setup = prepare_sum(scene, work, time, a, b, pose)
-    _, inset, lens, least_gap, sizes = setup
+    inset, lens, least_gap, _, sizes = setup
     if lens == 0.0:
         return total
     count, least, work.near.seen[0] = 0, least_gap + inset, 0
