@@ -139,12 +139,10 @@ def least_friction(scene, work):
     for row in range(work.tally.candidates):
         if is_closed(work, row):
             view = contact_view(scene, work, NOW, row)
+            resting = resting_contact(view, 0.0)
+            limit = slip_limit(scene, resting) if has(scene, SLIP_LIMIT) else math.inf
             # Without a limit: tangential force at a displacement equal to the overlap.
-            slip, limit = view.overlap, math.inf
-            if has(scene, SLIP_LIMIT):
-                limit = slip_limit(scene, resting_contact(view, 0.0))
-            if limit < math.inf:
-                slip = limit
+            slip = limit if limit < math.inf else view.overlap
             normal, tangential = contact_force(scene, resting_contact(view, slip))
             friction = abs(tangential) / normal if normal > 0.0 else 0.0
             # A law with a tangential force but no Coulomb limit.

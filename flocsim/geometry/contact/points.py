@@ -65,21 +65,21 @@ def unit_vector(x, y):
     return x / length, y / length, length
 
 
+def difference(vectors, state, a, b):
+    """Return (x, y) of body a less that of body b, of positions or velocities in a state."""
+    x = vectors[state, a, X] - vectors[state, b, X]
+    return x, vectors[state, a, Y] - vectors[state, b, Y]
+
+
 @hook
 def separation(scene, work, state, a, b):
     """Return the vector (x, y) [m] from the centroid of body b to that of body a, in a state."""
-    return work.place[state, a, X] - work.place[state, b, X], work.place[state, a, Y] - work.place[
-        state, b, Y
-    ]
+    return difference(work.place, state, a, b)
 
 
 def relative_velocity(work, state, a, b):
     """Return the velocity (x, y) [m/s] of the centroid of body a relative to that of body b."""
-    velocity = work.velocity
-    return (
-        velocity[state, a, X] - velocity[state, b, X],
-        velocity[state, a, Y] - velocity[state, b, Y],
-    )
+    return difference(work.velocity, state, a, b)
 
 
 def nearest_displacement(displacement, period):
@@ -92,8 +92,8 @@ def nearest_displacement(displacement, period):
 def nearest_image(scene, work, state, a, b):
     """Return `separation` in a periodic domain: to the image of a that is nearest to b."""
     width, height = scene.box
-    x = nearest_displacement(work.place[state, a, X] - work.place[state, b, X], width)
-    return x, nearest_displacement(work.place[state, a, Y] - work.place[state, b, Y], height)
+    x, y = difference(work.place, state, a, b)
+    return nearest_displacement(x, width), nearest_displacement(y, height)
 
 
 PERIODIC: dict[Callable, Callable] = {separation: nearest_image}
