@@ -38,13 +38,23 @@ Function = TypeVar("Function", bound=Callable)
 HOOKS: dict[str, Callable] = {}
 """{"module.name": function}: all functions that may be replaced."""
 
-LAWS = (
-    "body_force", "velocity_derivatives", "position_derivatives",
-    "centre_force", "centre_derivatives", "surface_force", "surface_derivatives",
-    "contact_force", "contact_derivatives", "slip_limit", "contact_event",
-    "outline_pressure", "oriented_energy",
-)  # fmt: skip
-"""Names of the laws, in the order of ``scene.laws``."""
+LAWS: dict[str, tuple[Any, int]] = {
+    "body_force": (BodyView, 3),
+    "velocity_derivatives": (BodyView, 9),
+    "position_derivatives": (BodyView, 9),
+    "centre_force": (PairView, 1),
+    "centre_derivatives": (PairView, 2),
+    "surface_force": (PairView, 1),
+    "surface_derivatives": (PairView, 2),
+    "contact_force": (ContactView, 2),
+    "contact_derivatives": (ContactView, 10),
+    "slip_limit": (ContactView, 1),
+    "contact_event": (ContactView, 1),
+    "outline_pressure": (OutlineView, 1),
+    "oriented_energy": (OrientedView, 1),
+}
+"""{name of a law: (its argument besides the parameters, how many values it returns)}, in the order
+of ``scene.laws``. For bodies the argument may be a PlainBodyView."""
 
 # The index of each law in ``scene.laws``.
 (
@@ -181,40 +191,28 @@ def outline_pressure(scene, view):
     return scene.laws[OUTLINE_PRESSURE](view, scene.parameters)
 
 
-VIEWS = (
-    *(BodyView,) * 3,
-    *(PairView,) * 4,
-    *(ContactView,) * 4,
-    OutlineView,
-    OrientedView,
-)
-"""The argument of each law besides the parameters; for bodies it may be a PlainBodyView."""
-
-NUMBERS = 3, 9, 9, 1, 2, 1, 2, 2, 10, 1, 1, 1, 1
-"""Number of values that each law returns."""
-
-
-def view_of(index: int, plain: bool) -> Any:
+def view_of(law: str, plain: bool) -> Any:
     """Return the view that a law receives; ``plain`` if no kernel reads the numbers of shapes."""
-    return PlainBodyView if plain and VIEWS[index] is BodyView else VIEWS[index]
+    view, _ = LAWS[law]
+    return PlainBodyView if plain and view is BodyView else view
 
 
 @functools.cache
-def argument_types(index: int, plain: bool) -> Any:
+def argument_types(law: str, plain: bool) -> Any:
     """Return the numba types of a law's arguments."""
     from numba import types
 
     from flocsim.compiler.table_types import Elements
 
-    number, view = types.float64, view_of(index, plain)
-    more = (types.int64,) if index == CONTACT_EVENT else ()
+    number, view = types.float64, view_of(law, plain)
+    more = (types.int64,) if law == "contact_event" else ()
     given = types.NamedUniTuple(number, len(view._fields), view)
     return given, Elements(number, (0,)), *more
 
 
-def signature_text(index: int, plain: bool) -> str:
+def signature_text(law: str, plain: bool) -> str:
     """Return the signature of a law as text, which is part of its cache key."""
-    return f"{LAWS[index]} {view_of(index, plain)._fields} {NUMBERS[index]}"
+    return f"{law} {view_of(law, plain)._fields} {LAWS[law][1]}"
 
 
 def has_address(scene, law):
@@ -231,8 +229,8 @@ def compiled_calls(plain: bool) -> dict[Callable, Callable]:
     calls: dict[Callable, Callable] = {has: has_address}
     # Numba needs a function of fixed arity for each law, so they are generated.
     for index, law in enumerate(LAWS):
-        more = ", which" if index == CONTACT_EVENT else ""
-        call = Intrinsic(signature_text(index, plain), functools.partial(call_of_law, index, plain))
+        more = ", which" if law == "contact_event" else ""
+        call = Intrinsic(signature_text(law, plain), functools.partial(call_of_law, law, plain))
         names: dict[str, Any] = {"call": call, "__name__": __name__}
         exec(
             f"def {law}(scene, view{more}):\n"
@@ -243,14 +241,14 @@ def compiled_calls(plain: bool) -> dict[Callable, Callable]:
     return calls
 
 
-def call_of_law(index, plain):
+def call_of_law(law, plain):
     """Return the function by which compiled code calls a law by its address."""
     from flocsim.compiler.table_types import call_of
 
     def target(given):
-        expected = argument_types(index, plain)
-        assert tuple(given[1:]) == expected, f"{LAWS[index]} is given {given}"
-        return "", "d" * NUMBERS[index]
+        expected = argument_types(law, plain)
+        assert tuple(given[1:]) == expected, f"{law} is given {given}"
+        return "", "d" * LAWS[law][1]
 
     return call_of(target)
 
@@ -264,13 +262,9 @@ def law_table(functions: dict[str, Callable], *, jit: bool, plain: bool = False)
     if not jit:
         return tuple(functions.get(name) for name in LAWS)
     # Addresses of compiled laws; 0 where the scene has none.
-    addresses = [
-        compile_law(
-            functions[name], signature_text(index, plain),
-            functools.partial(argument_types, index, plain),
-        )
-        if name in functions
-        else 0
-        for index, name in enumerate(LAWS)
-    ]  # fmt: skip
+    addresses = [0] * len(LAWS)
+    for index, name in enumerate(LAWS):
+        if name in functions:
+            given = functools.partial(argument_types, name, plain)
+            addresses[index] = compile_law(functions[name], signature_text(name, plain), given)
     return np.array(addresses, dtype=np.int64)

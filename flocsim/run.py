@@ -7,7 +7,8 @@ an end from one that the method alone is to blame for.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -203,34 +204,28 @@ def locate(scene: Any, work: Work) -> bool:
 def views_of(
     system: Any, scene: Any, work: Work, time: float, located: Callable[..., bool]
 ) -> dict[str, list]:
-    """Return {first part of laws' names: [views]} for the state NOW.
+    """Return {where forces act: [views]} for the state NOW.
 
     ``located(scene, work)`` lists the pairs there (see locate).
     """
     bodies = range(len(system.bodies))
     pairs = [(a, b) for a in bodies for b in range(a) if counts_as_pair(scene.bodies, a, b)]
     views = {
-        "body": [body_view(scene, work, time, NOW, body) for body in bodies],
-        "centre": [centre_view(scene, work, time, NOW, a, b) for a, b in pairs],
-        "oriented": [oriented_now(scene, work, time, a, b) for a, b in pairs],
+        "bodies": [body_view(scene, work, time, NOW, body) for body in bodies],
+        "centres": [centre_view(scene, work, time, NOW, a, b) for a, b in pairs],
+        "orientations": [oriented_now(scene, work, time, a, b) for a, b in pairs],
     }
     if located(scene, work):
         rows = range(work.tally.candidates)
         touching = [row for row in rows if work.geometry[NOW, row].gap < 0.0]
         flag_near(scene, work, NOW, 0.0)
-        first, views["surface"] = 0, []
+        first, views["surfaces"] = 0, []
         while first < len(rows):
             end = pair_end(work, first)
-            views["surface"].append(surface_view(scene, work, time, NOW, first, end))
+            views["surfaces"].append(surface_view(scene, work, time, NOW, first, end))
             first = end
-        views["contact"] = [contact_view(scene, work, NOW, row) for row in touching]
+        views["contacts"] = [contact_view(scene, work, NOW, row) for row in touching]
     return views
-
-
-def family(law: str) -> str:
-    """Return the key in views_of of the views that a law receives."""
-    first = law.partition("_")[0]
-    return {"velocity": "body", "position": "body", "slip": "contact"}.get(first, first)
 
 
 def values_of(law: Callable, view: Any, parameters: np.ndarray, which: tuple[int, ...]) -> tuple:
@@ -245,35 +240,31 @@ def values_of(law: Callable, view: Any, parameters: np.ndarray, which: tuple[int
 
 def kernel_of(force: Any, law: str, fluid: Any) -> Callable:
     """Return the function of a force that a law calls."""
-    if family(law) == "body":
-        return force.kernel_in(fluid)
-    if law.endswith("derivatives") and getattr(force, "slope", None) is not None:
-        return force.slope
-    return getattr(
-        force, {"slip_limit": "slip_limit", "contact_event": "events"}.get(law, "kernel")
-    )
+    if law == "contact_event":
+        return force.events
+    if law == "slip_limit":
+        return force.slip_limit
+    has_slope = law.endswith("derivatives") and getattr(force, "slope", None) is not None
+    return force.slope if has_slope else force.kernel_in(fluid)
 
 
 @np.errstate(all="ignore")
-def invalid_value(force: Any, pieces: Pieces, views: dict[str, list], fluid: Any) -> str:
+def invalid_value(force: Any, pieces: Pieces, views: Iterable, fluid: Any) -> str:
     """Return "kernel (file:line) gives nan at …" for a force, "" if all of its answers are finite.
 
-    ``pieces`` belong to this force alone; ``views`` are {"body", "centre", …: the views to
-    evaluate}.
+    ``pieces`` belong to this force alone; ``views`` are those to evaluate.
     """
     parameters = np.array(pieces.parameters, dtype=float)
     for name, law in pieces.laws.items():
-        each_event = range(pieces.events) if name == "contact_event" else [None]
-        for view in views.get(family(name), ()):
-            for event in each_event:
-                which = () if event is None else (event,)
-                most = math.inf if name in INFINITE_ALLOWED else LARGEST
-                values = values_of(law, view, parameters, which)
-                wrong = [value for value in values if not abs(value) <= most]
-                if wrong:
-                    what = where(kernel_of(force, name, fluid))
-                    slope = "a slope of " if name.endswith("derivatives") else ""
-                    return f"{what} gives {slope}{float(wrong[0])} at {describe_sample(view)}"
+        each_event = [(event,) for event in range(pieces.events)]
+        most = math.inf if name in INFINITE_ALLOWED else LARGEST
+        for view, which in product(views, each_event if name == "contact_event" else [()]):
+            values = values_of(law, view, parameters, which)
+            wrong = [value for value in values if not abs(value) <= most]
+            if wrong:
+                what = where(kernel_of(force, name, fluid))
+                slope = "a slope of " if name.endswith("derivatives") else ""
+                return f"{what} gives {slope}{float(wrong[0])} at {describe_sample(view)}"
     return ""
 
 
@@ -297,7 +288,7 @@ def force_to_blame(system: Any, run: Run) -> str:
         work.place[NOW] += ahead * work.velocity[NOW]
         views = views_of(system, scene, work, run.clock.time + ahead, located)
         for name, force, own in pieces:
-            words = invalid_value(force, own, views, system.fluid)
+            words = invalid_value(force, own, views.get(force.acts_on, ()), system.fluid)
             if words:
                 return f"{name}: {words}" if classes.count(type(force)) > 1 else words
     return ""

@@ -28,12 +28,19 @@ from flocsim.bonds.escape import (
     BARRIER,
     CLIMB_STEP,
     LEAST_CLIMB_STEP,
+    attraction_at,
     can_escape,
-    forces_at_rest,
+    path_length,
+    radii_of,
     variation_length,
 )
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.points import contact_point, least_listed_gap, separation
+from flocsim.geometry.contact.points import (
+    contact_point,
+    least_listed_gap,
+    relative_velocity,
+    separation,
+)
 from flocsim.hooks import (
     CENTRE_FORCE,
     CONTACT_FORCE,
@@ -44,7 +51,7 @@ from flocsim.hooks import (
 from flocsim.integrators.rhs.outline_sum import outline_reach
 from flocsim.integrators.rhs.surface_gap import flag_near, surface_view
 from flocsim.integrators.rhs.views import centre_line, contact_view, effective_mass
-from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.bodies import ANGLE
 from flocsim.state.views import moved_contact
 from flocsim.state.work import NOW
 
@@ -109,11 +116,6 @@ def smaller_bounding_radius(scene, i, j):
     return min(scene.bodies[i].bounding_radius, scene.bodies[j].bounding_radius)
 
 
-def radii_of(scene, bond):
-    """Return r_i + r_j of the equivalent radii [m]."""
-    return scene.bodies[bond.i].equivalent_radius + scene.bodies[bond.j].equivalent_radius
-
-
 def are_spheres(scene, bond):
     """Return True if both bodies are spheres."""
     count_i = scene.first[bond.i + 1] - scene.first[bond.i]
@@ -124,10 +126,7 @@ def speeds_of(scene, work, bond):
     """Return the speeds of j relative to i, as a rigid doublet [m/s]: (along the line of centres,
     any)."""
     i, j = bond.i, bond.j
-    ux, uy = (
-        work.velocity[NOW, j, X] - work.velocity[NOW, i, X],
-        work.velocity[NOW, j, Y] - work.velocity[NOW, i, Y],
-    )
+    ux, uy = relative_velocity(work, NOW, j, i)
     # Subtract the rigid rotation with i's spin; the difference of the spins counts at the outline.
     rx, ry = bond.nx * bond.distance, bond.ny * bond.distance
     spin = work.velocity[NOW, i, ANGLE]
@@ -165,18 +164,11 @@ def energy_of(scene, work, bond):
     It is the energy of relative motion and of both spins, plus twice the elastic energy of the
     contacts.
     """
-    i, j = bond.i, bond.j
-    ux, uy = (
-        work.velocity[NOW, j, X] - work.velocity[NOW, i, X],
-        work.velocity[NOW, j, Y] - work.velocity[NOW, i, Y],
-    )
-    total = 0.5 * effective_mass(scene, i, j) * (ux * ux + uy * uy)
-    total += (
-        0.5 * scene.bodies[i].inertia * work.velocity[NOW, i, ANGLE] * work.velocity[NOW, i, ANGLE]
-    )
-    total += (
-        0.5 * scene.bodies[j].inertia * work.velocity[NOW, j, ANGLE] * work.velocity[NOW, j, ANGLE]
-    )
+    ux, uy = relative_velocity(work, NOW, bond.j, bond.i)
+    total = 0.5 * effective_mass(scene, bond.i, bond.j) * (ux * ux + uy * uy)
+    for body in (bond.i, bond.j):
+        spin = work.velocity[NOW, body, ANGLE]
+        total += 0.5 * scene.bodies[body].inertia * spin * spin
     if not has(scene, CONTACT_FORCE):
         return total
     for row in range(work.tally.candidates):
@@ -202,37 +194,20 @@ REFINEMENT = 0.125
 """Step of the refined search near the maximum over that of the first search."""
 
 
-def attraction_at(scene, work, time, bond, displacement):
-    """Return the attraction (between centres, between outlines) [N] at rest, both gaps wider by
-    ``displacement`` [m]."""
-    distance, gap = bond.distance + displacement, bond.surface_gap + displacement
-    known = scene, work, time, bond.j, bond.i
-    centres, outlines = forces_at_rest(*known, distance, gap, displacement)
-    return -centres, -outlines
-
-
 def is_enough(total, outline_part, centre_part, enough):
     """Return True if a capacity suffices: its total, and one of its two parts."""
     return total > enough[0] and (outline_part > enough[1] or centre_part > enough[2])
 
 
-def gaps_length(scene, bond, displacement, longest):
-    """Return variation_length of a bond whose gaps are wider by a displacement [m]."""
-    between = bond.distance + displacement - radii_of(scene, bond)
-    gaps = bond.surface_gap + displacement, bond.gap + displacement
-    return variation_length(scene, between, *gaps, longest)
-
-
 @apart
-def largest_attraction(scene, work, time, bond, start, end, near, share, enough):
+def largest_attraction(scene, work, time, bond, start, end, near, share, enough, found):
     """Return the largest attraction [N] along the way out, as in `capacity`, and its position [m].
 
     ``start``, ``end``: range of displacements [m]; ``share``: step over the distance on which
-    forces vary.
+    forces vary; ``found``: the largest so far.
     """
-    best = start
-    total, outline_part, centre_part = 0.0, 0.0, 0.0
-    displacement = start
+    total, outline_part, centre_part = found
+    displacement, best = start, start
     while displacement < end:
         centres, surfaces = attraction_at(scene, work, time, bond, displacement)
         if centres + surfaces > total:
@@ -243,17 +218,9 @@ def largest_attraction(scene, work, time, bond, start, end, near, share, enough)
             centre_part = max(centre_part, centres)
         if is_enough(total, outline_part, centre_part, enough):
             break
-        length = gaps_length(scene, bond, displacement, end)
+        length = variation_length(scene, bond, displacement, end)
         displacement += max(share * length, LEAST_CLIMB_STEP)
     return total, outline_part, centre_part, best
-
-
-@apart
-def can_leave(scene, work, time, bond, pull, needed):
-    """Return True if less than an energy [J] leads out of the attraction, with the help of a pull
-    [N]."""
-    known = scene, work, time, bond.j, bond.i
-    return can_escape(*known, bond.distance, bond.surface_gap, pull, needed)
 
 
 def capacity(scene, work, time, bond, near, enough):
@@ -265,23 +232,23 @@ def capacity(scene, work, time, bond, near, enough):
     between = scene.surface_reach > bond.surface_gap or outline_reach(scene) > bond.gap
     if not has(scene, CENTRE_FORCE) and not between:
         return 0.0, 0.0, 0.0
-    radii = radii_of(scene, bond)
-    # Search up to two mean diameters beyond contact.
-    end = 2.0 * radii + max(-bond.surface_gap, radii - bond.distance, 0.0)
-    known = scene, work, time, bond, 0.0, end, near, CLIMB_STEP, enough
-    total, outline_part, centre_part, best = largest_attraction(*known)
-    if is_enough(total, outline_part, centre_part, enough):
-        return total, outline_part, centre_part
-    # Refine around the maximum, which may be a cusp.
-    around = CLIMB_STEP * gaps_length(scene, bond, best, radii)
-    start, end = max(best - around, 0.0), best + around
-    known = scene, work, time, bond, start, end, near, REFINEMENT * CLIMB_STEP, enough
-    finer_total, finer_outline_part, finer_centre_part, _ = largest_attraction(*known)
-    return (
-        max(total, finer_total),
-        max(outline_part, finer_outline_part),
-        max(centre_part, finer_centre_part),
+    start, end, found = 0.0, path_length(scene, bond), (0.0, 0.0, 0.0)
+    known = scene, work, time, bond
+    total, outline_part, centre_part, best = largest_attraction(
+        *known, start, end, near, CLIMB_STEP, enough, found
     )
+    if not is_enough(total, outline_part, centre_part, enough):
+        # Refine around the maximum, which may be a cusp.
+        around = CLIMB_STEP * variation_length(scene, bond, best, radii_of(scene, bond))
+        start, end, found = (
+            max(best - around, 0.0),
+            best + around,
+            (total, outline_part, centre_part),
+        )
+        total, outline_part, centre_part, _ = largest_attraction(
+            *known, start, end, near, REFINEMENT * CLIMB_STEP, enough, found
+        )
+    return total, outline_part, centre_part
 
 
 def leverage(work, bond, least):
@@ -327,7 +294,7 @@ def is_held(scene, work, time, bond, load):
     # Without contact, in a well between attraction and repulsion: they must not have the energy to
     # leave.
     kinetic_energy = 0.5 * mass * along * along
-    return bond.gap < 0.0 or not can_leave(scene, work, time, bond, load.force, kinetic_energy)
+    return bond.gap < 0.0 or not can_escape(scene, work, time, bond, load.force, kinetic_energy)
 
 
 def is_trapped(scene, work, time, bond, load):
@@ -345,7 +312,7 @@ def is_trapped(scene, work, time, bond, load):
     if not centres > pull:
         return False
     needed = SAFETY * energy_of(scene, work, bond)
-    return not can_leave(scene, work, time, bond, pull, needed)
+    return not can_escape(scene, work, time, bond, pull, needed)
 
 
 def is_certain(scene, work, time, bond, load):
@@ -367,4 +334,4 @@ def is_certain_in_kicks(scene, work, time, bond, load):
             # If outlines do not carry the load by themselves, it may pry.
             pull *= leverage(work, bond, load.lever)
     needed = BARRIER * load.kicks + energy_of(scene, work, bond)
-    return not can_leave(scene, work, time, bond, pull, needed)
+    return not can_escape(scene, work, time, bond, pull, needed)

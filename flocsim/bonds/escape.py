@@ -6,6 +6,7 @@ centres, of the gap of the outlines, or of both; both widen alike here, as in a 
 
 import math
 
+from flocsim.compiler.linker import apart
 from flocsim.hooks import CENTRE_FORCE, ORIENTED_ENERGY, centre_force, has, surface_force
 from flocsim.integrators.rhs.outline_sum import has_outline_forces, outline_reach, outline_repulsion
 from flocsim.integrators.rhs.views import pair_view
@@ -38,46 +39,57 @@ def forces_at_rest(scene, work, time, a, b, distance, gap, displacement):
     return centres, outlines
 
 
-def variation_length(scene, between, gap, feature_gap, longest):
-    """Return the length over which such forces vary [m]: the smallest of the gaps that they depend
-    on.
+def radii_of(scene, bond):
+    """Return r_i + r_j of the equivalent radii [m]."""
+    return scene.bodies[bond.i].equivalent_radius + scene.bodies[bond.j].equivalent_radius
 
-    ``between``: gap of the equivalent spheres; ``gap``: that of surface forces; ``feature_gap``:
-    that of the outlines' features.
-    """
+
+def attraction_at(scene, work, time, bond, displacement):
+    """Return the attraction (between centres, between outlines) [N] at rest, both gaps wider by
+    ``displacement`` [m]."""
+    distance, gap = bond.distance + displacement, bond.surface_gap + displacement
+    known = scene, work, time, bond.j, bond.i
+    centres, outlines = forces_at_rest(*known, distance, gap, displacement)
+    return -centres, -outlines
+
+
+def path_length(scene, bond):
+    """Return how far the way out leads [m]: to two mean diameters beyond contact."""
+    radii = radii_of(scene, bond)
+    return 2.0 * radii + max(-bond.surface_gap, radii - bond.distance, 0.0)
+
+
+def variation_length(scene, bond, displacement, longest):
+    """Return the length over which these forces vary [m]: the smallest of the gaps that they depend
+    on, all wider by a displacement."""
     length = longest
     if has(scene, CENTRE_FORCE):
-        length = min(length, abs(between))
+        length = min(length, abs(bond.distance + displacement - radii_of(scene, bond)))
     if scene.surface_reach > 0.0:
-        length = min(length, abs(gap))
-    if feature_gap < outline_reach(scene):
-        length = min(length, max(feature_gap, scene.outlines[1]))
+        length = min(length, abs(bond.surface_gap + displacement))
+    if bond.gap + displacement < outline_reach(scene):
+        length = min(length, max(bond.gap + displacement, scene.outlines[1]))
     return length
 
 
-def can_escape(scene, work, time, a, b, distance, gap, load, needed):
+@apart
+def can_escape(scene, work, time, bond, load, needed):
     """Return True if less than ``needed`` [J] leads out of the attraction of a pair under a pulling
     load.
 
-    Integrates −(F + load) outwards and compares its maximum with ``needed``. ``load`` [N] pulls the
-    pair apart. The answer is True, too, where forces depend on orientation: another path may be
-    lower.
+    Integrates the attraction less the load outwards and compares its maximum with ``needed``.
+    ``load`` [N] pulls the pair apart. The answer is True, too, where forces depend on orientation:
+    another path may be lower.
     """
     if not load < math.inf or has(scene, ORIENTED_ENERGY):
         return True
-    sizes = scene.bodies[a].equivalent_radius + scene.bodies[b].equivalent_radius
-    # The path ends 2 (r_a + r_b) beyond the touch.
-    energy, displacement = 0.0, 0.0
-    end = 2.0 * sizes + max(-gap, sizes - distance, 0.0)
+    energy, displacement, end = 0.0, 0.0, path_length(scene, bond)
     while displacement < end:
-        between, apart = distance + displacement - sizes, gap + displacement
-        increment = CLIMB_STEP * variation_length(scene, between, apart, apart, end)
+        increment = CLIMB_STEP * variation_length(scene, bond, displacement, end)
         increment = max(increment, LEAST_CLIMB_STEP)
         # Midpoint rule.
-        middle = displacement + 0.5 * increment
-        point = distance + middle, gap + middle, middle
-        centres, outlines = forces_at_rest(scene, work, time, a, b, *point)
-        energy -= (centres + outlines + load) * increment
+        centres, outlines = attraction_at(scene, work, time, bond, displacement + 0.5 * increment)
+        energy += (centres + outlines - load) * increment
         if energy > needed:
             return False
         displacement += increment

@@ -34,14 +34,12 @@ from flocsim.bonds.certificate import (
     NO_BOND,
     REST,
     are_spheres,
-    can_leave,
     capacity,
     is_closed,
-    radii_of,
     resting_contact,
     smaller_bounding_radius,
 )
-from flocsim.bonds.escape import BARRIER
+from flocsim.bonds.escape import BARRIER, can_escape, radii_of
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import contact_point
 from flocsim.hooks import CONTACT_FORCE, SLIP_LIMIT, contact_force, has, slip_limit
@@ -101,7 +99,7 @@ def outlasts_kicks(scene, work, time, bond, load):
         radii = scene.bodies[bond.i].radius, scene.bodies[bond.j].radius
         # The energy to lift a shape by the smaller spheroradius against the load.
         return load.force > 0.0 and load.force * min(radii[0], radii[1]) >= barrier
-    return load.force > 0.0 and not can_leave(scene, work, time, bond, load.force, barrier)
+    return load.force > 0.0 and not can_escape(scene, work, time, bond, load.force, barrier)
 
 
 def kind_at_rest(scene, work, time, bond, load, rested):
@@ -141,12 +139,10 @@ def least_friction(scene, work):
     for row in range(work.tally.candidates):
         if is_closed(work, row):
             view = contact_view(scene, work, NOW, row)
+            resting = resting_contact(view, 0.0)
+            limit = slip_limit(scene, resting) if has(scene, SLIP_LIMIT) else math.inf
             # Without a limit: tangential force at a displacement equal to the overlap.
-            slip, limit = view.overlap, math.inf
-            if has(scene, SLIP_LIMIT):
-                limit = slip_limit(scene, resting_contact(view, 0.0))
-            if limit < math.inf:
-                slip = limit
+            slip = limit if limit < math.inf else view.overlap
             normal, tangential = contact_force(scene, resting_contact(view, slip))
             friction = abs(tangential) / normal if normal > 0.0 else 0.0
             # A law with a tangential force but no Coulomb limit.

@@ -32,6 +32,11 @@ class Force(ABC):
     def kernel(view):
         """Return the force, pressure or energy; each kind states units and shape."""
 
+    @property
+    def acts_on(self) -> str:
+        """Where the force acts; "" for what is evaluated otherwise than by a kernel."""
+        return ""
+
     def kernel_in(self, fluid: Fluid) -> Callable:
         """Return the kernel to use in this fluid; a subclass may choose a cheaper one for some
         fluids."""
@@ -57,6 +62,8 @@ class BodyForce(Force):
     ``kernel(body, …) → (fx, fy, torque)`` [N, N, N m], torque about the centroid; ``body`` is a
     BodyView.
     """
+
+    acts_on = "bodies"
 
 
 @attrs.frozen
@@ -163,6 +170,8 @@ class ContactForce(Force):
     is 0. With ``goes_on_apart = True`` the kernel receives negative overlaps as well, for a law
     that continues smoothly there.
     """
+
+    acts_on = "contacts"
 
     slip_limit: ClassVar[Any] = None
     events: ClassVar[Any] = None

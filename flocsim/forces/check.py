@@ -8,6 +8,7 @@ import math
 import traceback
 import types
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import product
 from numbers import Real
 from typing import Any
 
@@ -18,23 +19,25 @@ from flocsim.body import Fluid
 from flocsim.compiler.fingerprint import describe
 from flocsim.compiler.linker import names_in, reads, refuse_closure, where
 from flocsim.errors import KernelError, closest
-from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
+from flocsim.forces.base import ContactForce, Force, PairForce
 from flocsim.state.views import BodyView, ContactView, OrientedView, OutlineView, PairView
 
-SAMPLE_BODIES = (
-    BodyView(
-        1e-3, 2e-6, -3e-6, 0.5, 1e-4, -2e-4, 3.0, 2e-10, 1e-10, 2e-21, 5e-6, 0.6, 0.3,
-        10.0, -20.0, 30.0,
-    ),
-    BodyView(
-        0.0, -2e-6, 3e-6, -0.5, -1e-4, 2e-4, -3.0, 2e-10, 1e-10, 2e-21, 5e-6, 0.0, 0.0,
-        -10.0, 20.0, -30.0,
-    ),
+MOVING = BodyView(
+    1e-3, 2e-6, -3e-6, 0.5, 1e-4, -2e-4, 3.0, 2e-10, 1e-10, 2e-21, 5e-6, 0.6, 0.3,
+    10.0, -20.0, 30.0,
 )  # fmt: skip
+SIGNED = ("x", "y", "angle", "vx", "vy", "spin", "kick_x", "kick_y", "kick_turn")
+REVERSED = {name: -getattr(MOVING, name) for name in SIGNED}
+# A body, and its reverse without a long axis.
+SAMPLE_BODIES = MOVING, MOVING._replace(time=0.0, elongation=0.0, long_axis=0.0, **REVERSED)
 SAMPLE_CONTACTS = tuple(
     ContactView(1e-8, rate, slip, -1e5 * slip, 1e-10, 1e-6, 2e-6, 1e-5)
     for rate in (1e-4, -1e-4) for slip in (1e-9, -1e-9)
 )  # fmt: skip
+
+
+SIZES = 1e-6, 2e-6, 2e-6 / 3.0, 1e-10
+"""Sizes at the end of the sample views of pairs: radii, reduced radius [m], effective mass [kg]."""
 
 
 def sample_gaps(reach):
@@ -45,34 +48,30 @@ def sample_gaps(reach):
 
 def sample_pairs(reach: float) -> tuple[PairView, ...]:
     """Return PairViews with gaps and gap rates of both signs, within the reach of a force [m]."""
+    gaps, rates = sample_gaps(reach), (-1e-4, 1e-4)
     return tuple(
-        PairView(1e-3, gap, rate, gap + 3e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
-        for gap in sample_gaps(reach) for rate in (-1e-4, 1e-4)
-    )  # fmt: skip
+        PairView(1e-3, gap, rate, gap + 3e-6, *SIZES) for gap, rate in product(gaps, rates)
+    )
 
 
-def samples_of(force: Force) -> tuple:
+def samples_of(force: Any) -> tuple:
     """Return sample views of the kind that a force's kernels receive."""
-    if isinstance(force, BodyForce):
+    if force.acts_on == "bodies":
         return SAMPLE_BODIES
-    if isinstance(force, ContactForce):
+    if force.acts_on == "contacts":
         return SAMPLE_CONTACTS
-    assert isinstance(force, PairForce)
+    reach = reach_of(force)
     if force.acts_on == "outlines":
-        return tuple(
-            OutlineView(1e-3, gap, gap, apart, apart, 2e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
-            for gap in sample_gaps(reach_of(force))
-            # Outlines count as d_min or more apart; 1e-10 m stands for it.
-            for apart in [max(gap, 1e-10)]
-        )
+        # Outlines count as d_min or more apart; 1e-10 m stands for it.
+        gaps = [(gap, max(gap, 1e-10)) for gap in sample_gaps(reach)]
+        return tuple(OutlineView(1e-3, gap, gap, apart, apart, 2e-6, *SIZES) for gap, apart in gaps)
     if force.acts_on == "orientations":
+        turned = product(sample_gaps(reach), (-2.0, 0.0, 1.0))
         return tuple(
-            OrientedView(
-                1e-3, gap, gap + 3e-6, angle, 1.0 - 2.0 * angle, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10
-            )
-            for gap in sample_gaps(reach_of(force)) for angle in (-2.0, 0.0, 1.0)
-        )  # fmt: skip
-    return sample_pairs(reach_of(force))
+            OrientedView(1e-3, gap, gap + 3e-6, angle, 1.0 - 2.0 * angle, *SIZES)
+            for gap, angle in turned
+        )
+    return sample_pairs(reach)
 
 
 def kernel_error(force, function, finding):
@@ -279,22 +278,24 @@ def event_count(force: ContactForce, fluid: Fluid) -> int:
     return len(next(results(force, force.events, SAMPLE_CONTACTS, arguments), ()))
 
 
-def check_kernel(force: Force, fluid: Fluid) -> None:
+RESULTS = {
+    "bodies": ("fx", "fy", "torque"), "contacts": ("normal", "tangential"),
+    "centres": ("repulsion [N]",), "surfaces": ("repulsion [N]",),
+    "outlines": ("pressure [Pa]",), "orientations": ("energy [J]",),
+}  # fmt: skip
+"""{where a force acts: what its kernel returns}."""
+
+
+def check_kernel(force: Any, fluid: Fluid) -> None:
     """Raise KernelError unless all kernels of a force are usable.
 
     Each is called uncompiled on sample views, which finds misspelt attributes, unknown parameters,
     and results of the wrong kind.
     """
-    kernel = force.kernel_in(fluid)
-    if isinstance(force, BodyForce):
-        check_results(force, fluid, kernel, "fx", "fy", "torque")
-    elif isinstance(force, PairForce):
-        wanted = {"outlines": "pressure [Pa]", "orientations": "energy [J]"}
-        check_results(force, fluid, kernel, wanted.get(force.acts_on, "repulsion [N]"))
-        if force.slope is not None and force.acts_on not in wanted:
-            check_results(force, fluid, force.slope, "slope [N/m]")
-    elif isinstance(force, ContactForce):
-        check_results(force, fluid, kernel, "normal", "tangential")
+    check_results(force, fluid, force.kernel_in(fluid), *RESULTS[force.acts_on])
+    if force.acts_on in ("centres", "surfaces") and force.slope is not None:
+        check_results(force, fluid, force.slope, "slope [N/m]")
+    elif force.acts_on == "contacts":
         if force.slides:
             check_results(force, fluid, force.slip_limit, "largest slip [m]")
         if force.has_events:

@@ -17,8 +17,9 @@ import attrs
 
 from flocsim.body import NO_LAYER, NO_OUTLINES, Fluid
 from flocsim.errors import KernelError, UsageError
-from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce, force_names
+from flocsim.forces.base import Force, force_names
 from flocsim.forces.check import (
+    RESULTS,
     check_kernel,
     event_count,
     fields_read,
@@ -74,9 +75,6 @@ def pressed_contact(view):
 VIEWS = BodyView, PlainBodyView, ContactView, PairView
 VELOCITIES = {"vx", "vy", "spin"}
 PLACES = {"x", "y", "angle", "time"}
-PLACES_OF_PAIRS = {
-    "centres": "centre", "surfaces": "surface", "outlines": "outline", "orientations": "oriented",
-}  # fmt: skip
 BLOCK_LENGTH = 64
 """Parameters of each kind of force start at a multiple of this index, so that more parameters of
 one kind do not change the source of another kind's laws."""
@@ -194,15 +192,13 @@ def sum_function(name, view, terms, zeros):
     return "\n".join(lines) + "\n"
 
 
-def difference_text(call, field, size):
-    """Return the source of a central difference of a pair kernel with respect to one field."""
-    index = PairView._fields.index(field)
-    shifted = []
-    for sign in "+-":
-        fields = [f"pair.{each}" for each in PairView._fields]
-        fields[index] = f"pair.{field} {sign} {size}"
-        shifted.append(call.replace("(pair", f"(PairView({', '.join(fields)})", 1))
-    return f"({shifted[0]} - {shifted[1]}) / (2.0 * {size})"
+def difference_text(call, axis, size):
+    """Return the source of a central difference of a pair kernel by the gap (axis 0) or its rate
+    (axis 1)."""
+    ahead, behind = (
+        call.replace("(pair", f"(changed(pair, {axis}, {sign}{size})", 1) for sign in "+-"
+    )
+    return f"({ahead} - {behind}) / (2.0 * {size})"
 
 
 def change_text(kind, changed):
@@ -262,41 +258,36 @@ def write_body_laws(source, forces):
     return plain
 
 
+def write_sum(source, forces, law, view):
+    """Write the sum of forces between pairs (pressures, energies); return its terms."""
+    terms = []
+    for force in forces:
+        # Beyond its reach a force is not called at all.
+        condition = f"{view}.gap < {source.value(reach_of(force))}"
+        terms.append((condition, source.call(force, force.kernel_in(source.fluid), view)))
+    if terms:
+        source.functions.append(sum_function(law, view, terms, 1))
+    return terms
+
+
 def write_pair_laws(source, forces, kind):
     """Write the sum of pair forces and its derivatives: ∂F/∂gap and −∂F/∂(gap rate)."""
-    sums, derivatives = [], []
-    for force in forces:
-        kernel = force.kernel_in(source.fluid)
-        # Beyond its reach a force is not called at all.
-        condition = f"pair.gap < {source.value(reach_of(force))}"
-        call = source.call(force, kernel, "pair")
-        sums.append((condition, call))
+    terms, derivatives = write_sum(source, forces, f"{kind}_force", "pair"), []
+    for force, (condition, call) in zip(forces, terms, strict=True):
         if force.slope is None:
             # 1e-4 of the gap: power laws of the gap are resolved to 1e-8.
-            slope = difference_text(call, "gap", "(1e-4 * abs(pair.gap) + 1e-13)")
+            slope = difference_text(call, 0, "(1e-4 * abs(pair.gap) + 1e-13)")
         else:
             slope = source.call(force, force.slope, "pair")
         damping = "0.0"
         # Only a force that reads the rate of the gap has a damping.
-        if "gap_rate" in fields_read(force, source.fluid, kernel):
-            change = difference_text(call, "gap_rate", "(1e-3 * abs(pair.gap_rate) + 1e-9)")
+        if "gap_rate" in fields_read(force, source.fluid, force.kernel_in(source.fluid)):
+            change = difference_text(call, 1, "(1e-3 * abs(pair.gap_rate) + 1e-9)")
             damping = f"-({change})"
         derivatives.append((condition, f"{slope}, {damping}"))
     if forces:
-        source.functions += [
-            sum_function(f"{kind}_force", "pair", sums, 1),
-            sum_function(f"{kind}_derivatives", "pair", derivatives, 2),
-        ]
-
-
-def write_sum(source, forces, law, view):
-    """Write the sum of outline pressures, or of the energies of oriented pairs."""
-    terms = []
-    for force in forces:
-        call = source.call(force, force.kernel_in(source.fluid), view)
-        terms.append((f"{view}.gap < {source.value(reach_of(force))}", call))
-    if terms:
-        source.functions.append(sum_function(law, view, terms, 1))
+        source.functions.append(change_text(PairView, ("gap", "gap_rate")))
+        source.functions.append(sum_function(f"{kind}_derivatives", "pair", derivatives, 2))
 
 
 def write_contact_laws(source, forces):
@@ -335,7 +326,7 @@ def sort_forces(pieces, forces, fluid):
 
     Raises UsageError for an object that is no force, KernelError for an unusable kernel.
     """
-    kinds = {"body": [], "centre": [], "surface": [], "contact": [], "outline": [], "oriented": []}
+    kinds = {kind: [] for kind in RESULTS}
     forces = list(forces)
     for name, force in zip(force_names(forces), forces, strict=True):
         if not isinstance(force, Force):
@@ -349,21 +340,16 @@ def sort_forces(pieces, forces, fluid):
         # (integrators/rhs/pair_resistance.py).
         if isinstance(force, PairResistance):
             continue
-        try:
-            check_kernel(force, fluid)
-        except KernelError as error:  # the error names the class; put the unique name instead
-            raise KernelError(str(error).replace(type(force).__name__, name, 1)) from None
-        if isinstance(force, BodyForce):
-            kinds["body"].append(force)
-        elif isinstance(force, ContactForce):
-            kinds["contact"].append(force)
-        elif isinstance(force, PairForce):
-            kinds[PLACES_OF_PAIRS[force.acts_on]].append(force)
-        else:
+        if force.acts_on not in kinds:
             raise UsageError(
                 f"{name} must subclass BodyForce, CentreForce, SurfaceForce, OutlineForce, "
                 "OrientedForce or ContactForce"
             )
+        try:
+            check_kernel(force, fluid)
+        except KernelError as error:  # the error names the class; put the unique name instead
+            raise KernelError(str(error).replace(type(force).__name__, name, 1)) from None
+        kinds[force.acts_on].append(force)
     return kinds
 
 
@@ -375,28 +361,27 @@ def laws_of(forces: Iterable[Force], fluid: Fluid, shapes: Sequence[Shape] = ())
     pieces = Pieces()
     kinds = sort_forces(pieces, forces, fluid)
     sources = {kind: Source(fluid) for kind in kinds}
-    pieces.plain_bodies = write_body_laws(sources["body"], kinds["body"])
-    write_pair_laws(sources["centre"], kinds["centre"], "centre")
-    write_pair_laws(sources["surface"], kinds["surface"], "surface")
-    pieces.events = write_contact_laws(sources["contact"], kinds["contact"])
-    write_sum(sources["oriented"], kinds["oriented"], "oriented_energy", "pair")
-    if of_centres := [*kinds["centre"], *kinds["oriented"]]:
-        pieces.centre_reach = max(map(reach_of, of_centres))
-    if kinds["surface"]:
-        pieces.surface_reach = max(map(reach_of, kinds["surface"]))
+    pieces.plain_bodies = write_body_laws(sources["bodies"], kinds["bodies"])
+    write_pair_laws(sources["centres"], kinds["centres"], "centre")
+    write_pair_laws(sources["surfaces"], kinds["surfaces"], "surface")
+    pieces.events = write_contact_laws(sources["contacts"], kinds["contacts"])
+    write_sum(sources["orientations"], kinds["orientations"], "oriented_energy", "pair")
+    of_centres = [*kinds["centres"], *kinds["orientations"]]
+    pieces.centre_reach = max(map(reach_of, of_centres), default=-1.0)
+    pieces.surface_reach = max(map(reach_of, kinds["surfaces"]), default=-1.0)
     # A pair resistance follows the smooth gap, too: lubrication stands in for it there.
     lubrication = [
         lubrication_stand_in(each)
         for each in pieces.used.values()
         if isinstance(each, PairResistance)
     ]
-    if kinds["surface"] or lubrication:
-        pieces.smoothness = smoothness([*kinds["surface"], *lubrication], fluid)
+    if followers := [*kinds["surfaces"], *lubrication]:
+        pieces.smoothness = smoothness(followers, fluid)
     # A double layer thicker than corners are round acts between charges, not as a pressure.
-    layer = charge_layer(kinds["outline"], shapes)
-    pressures = pressures_of(kinds["outline"], layer)
-    write_sum(sources["outline"], pressures, "outline_pressure", "point")
-    pieces.outlines = outline_parameters(kinds["outline"], pressures, fluid)
+    layer = charge_layer(kinds["outlines"], shapes)
+    pressures = pressures_of(kinds["outlines"], layer)
+    write_sum(sources["outlines"], pressures, "outline_pressure", "point")
+    pieces.outlines = outline_parameters(kinds["outlines"], pressures, fluid)
     pieces.layer = layer_parameters(layer)
     for source in sources.values():
         pieces.laws |= source.laws(pieces.parameters)

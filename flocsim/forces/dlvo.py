@@ -226,8 +226,8 @@ class DoubleLayer(PairForce):
                 f'boundary = "{self.boundary}" is of law = "outline", found law = "{self.law}": '
                 "give that, or leave boundary out"
             )
-        # 1/sinh² diverges at d = 0: a least gap must be chosen by the user.
-        if self.unbounded != 0.0 and self.d_min is None:
+        # Its last part, of 1/sinh², diverges at d = 0: a least gap must be chosen by the user.
+        if self.parts[2] != 0.0 and self.d_min is None:
             like = "" if self.boundary == "charge" else " between unlike potentials"
             raise RangeError(
                 f'boundary = "{self.boundary}"{like} has a pressure without bound where outlines '
@@ -278,11 +278,6 @@ class DoubleLayer(PairForce):
         # condition decides which of the two diverges at d = 0.
         mean, rest = unit * (0.5 * (one + other)) ** 2, unit * (0.5 * (one - other)) ** 2
         return (0.0, mean, -rest) if self.boundary == "potential" else (0.0, -rest, mean)
-
-    @property
-    def unbounded(self) -> float:
-        """Coefficient [Pa] of 1/(2 sinh²(κd/2)), the term that diverges at d = 0."""
-        return self.parts[2]
 
     @property
     def closest(self) -> float:

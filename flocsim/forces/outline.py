@@ -12,7 +12,6 @@ where that line stays below D of every force. Scene.smoothing stores ℓ(0) [m],
 from which ℓ is constant [m].
 """
 
-import functools
 import math
 from collections.abc import Iterable, Sequence
 
@@ -42,14 +41,13 @@ angles, not only their distance."""
 
 def needs_both_shapes(force: Force) -> bool:
     """Return True if a force depends on both outlines, or on the orientations of both bodies."""
-    return isinstance(force, PairForce) and force.acts_on in NEEDS_BOTH_SHAPES and not force.absent
+    return force.acts_on in NEEDS_BOTH_SHAPES and not force.absent
 
 
 def refuse_outlines(forces: Iterable[Force], subject: str) -> None:
     """Raise UsageError if a force depends on both bodies' outlines, which ``subject`` does not
     support."""
     for force in filter(needs_both_shapes, forces):
-        assert isinstance(force, PairForce)
         words, advice = NEEDS_BOTH_SHAPES[force.acts_on]
         raise UsageError(
             f"{type(force).__name__} {words}, and {subject} has forces between spheres or nearest "
@@ -149,14 +147,6 @@ CONSTANT_DECAY = 0.9
 
 def decay_lengths(force: PairForce, fluid: Fluid) -> np.ndarray:
     """Return D = max |F(≥ g)|/|dF/dg| [m] at all GAPS but the last; inf where F is constant."""
-    try:
-        return cached_decay_lengths(force, fluid)
-    except TypeError:  # a force that holds a list or the like
-        return cached_decay_lengths.__wrapped__(force, fluid)
-
-
-@functools.lru_cache(maxsize=64)
-def cached_decay_lengths(force, fluid):
     kernel, gaps = force.kernel_in(fluid), GAPS
     arguments = kernel_arguments(force, fluid, kernel)
     shortest = np.full(len(gaps) - 1, math.inf)

@@ -30,11 +30,12 @@ def no_force(view, parameters):
 
 def lone_view(system, body):
     """Return the BodyView of a body at rest at the origin."""
-    shape = body.shape
-    return BodyView(
-        0.0, 0.0, 0.0, body.angle, 0.0, 0.0, 0.0, body.mass, body.buoyant_mass(system.fluid),
-        body.inertia, shape.equivalent_radius, shape.elongation, shape.long_axis, 0.0, 0.0, 0.0,
-        *drag.resistance_numbers(system.forces, body),
+    shape, zeros = body.shape, [0.0] * BodyView._fields.index("resistance_xx")
+    view = BodyView(*zeros, *drag.resistance_numbers(system.forces, body))
+    return view._replace(
+        angle=body.angle, mass=body.mass, buoyant_mass=body.buoyant_mass(system.fluid),
+        inertia=body.inertia, radius=shape.equivalent_radius, elongation=shape.elongation,
+        long_axis=shape.long_axis,
     )  # fmt: skip
 
 
@@ -49,11 +50,14 @@ def balance(force, view, parameters, velocity):
     return np.array((fx, fy, torque / r)[: len(velocity)])
 
 
-def derivative(force, view, parameters, velocity):
+def derivative(force, view, parameters, velocity, size=0.0):
     """Return ∂(fx, fy, …)/∂(vx, vy, …) by central differences; NaN if a force is undefined
-    there."""
-    # Increment: 1e-3 of the largest component, with a floor for a body at rest.
-    size = 1e-3 * np.abs(velocity).max() + 1e-9
+    there.
+
+    ``size``: their increment [m/s]; by default a thousandth of the largest component.
+    """
+    # The floor is for a body at rest.
+    size = size or 1e-3 * np.abs(velocity).max() + 1e-9
     columns = []
     try:
         for step in np.eye(len(velocity)) * size:
@@ -65,24 +69,21 @@ def derivative(force, view, parameters, velocity):
     return np.array(columns).T
 
 
-def resistance(system: Any, body: Body, speed: float, size: float = 0.0) -> float:
+def forces_on_lone(system: Any, body: Body) -> tuple[Any, BodyView, list[float]]:
+    """Return (law of the body forces, view of the body at rest, parameters of the law)."""
+    pieces: Any = system.pieces
+    return pieces.laws.get("body_force", no_force), lone_view(system, body), pieces.parameters
+
+
+def resistance(system: Any, body: Body, speed: float, size: float) -> float:
     """Return the derivative of the body forces with respect to speed along gravity [kg/s].
 
-    ``speed`` [m/s] is relative to the flow at the origin; ``size``: increment of the difference, by
-    default a thousandth of the speed. NaN if a force is undefined there.
+    ``speed`` [m/s] is relative to the flow at the origin; ``size``: increment of the difference.
+    NaN if a force is undefined there.
     """
-    pieces: Any = system.pieces
-    force = pieces.laws.get("body_force", no_force)
     u, v = system.fluid.velocity
-    size = size or 1e-3 * speed + 1e-9
-    view = lone_view(system, body)
-    # Force along y at two speeds around the given one, downwards relative to the flow.
-    ends = (u, v - speed + size), (u, v - speed - size)
-    try:
-        ahead, behind = (balance(force, view, pieces.parameters, end)[1] for end in ends)
-    except (ArithmeticError, ValueError):
-        return math.nan
-    return float(behind - ahead) / (2.0 * size)
+    velocity = np.array((u, v - speed))
+    return -float(derivative(*forces_on_lone(system, body), velocity, size)[1, 1])
 
 
 @np.errstate(all="ignore")
@@ -114,7 +115,7 @@ def least_mobility(system: Any, body: Body, speed: float, mobility: float) -> fl
         return mobility
     if drag.follows_shape(system.forces):
         return nonrotating_mobility(system, body)
-    there = resistance(system, body, speed)
+    there = resistance(system, body, speed, 1e-3 * speed + 1e-9)
     return min(mobility, 1.0 / there) if 0.0 < there < math.inf else mobility
 
 
@@ -154,9 +155,7 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
     """
     if body.fixed:
         return np.zeros(2), 0.0
-    pieces: Any = system.pieces
-    force = pieces.laws.get("body_force", no_force)
-    known = (force, lone_view(system, body), pieces.parameters)
+    known = forces_on_lone(system, body)
     velocity = np.zeros(3 if drag.follows_shape(system.forces) else 2)
     # Newton's method from rest.
     for _ in range(ITERATIONS):
@@ -176,5 +175,5 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
             return velocity, float(-1.0 / slope[1, 1])
     raise UsageError(
         "no terminal velocity: a binary collision starts from steady settling, which needs a drag "
-        f"(forces {', '.join(pieces.used) or 'none'} do not balance); add [forces.drag]"
+        f"(forces {', '.join(system.pieces.used) or 'none'} do not balance); add [forces.drag]"
     )

@@ -47,9 +47,8 @@ from flocsim.bonds.certificate import (
     is_certain,
     is_certain_in_kicks,
     pose_change,
-    radii_of,
 )
-from flocsim.bonds.escape import forces_at_rest
+from flocsim.bonds.escape import forces_at_rest, radii_of
 from flocsim.bonds.rest import NESTED_REST_TIMES, STABLE_POSE, is_swinging, kind_at_rest
 from flocsim.geometry.contact.near_pairs import core_distance, gap_between, pose_of
 from flocsim.geometry.contact.points import least_listed_gap

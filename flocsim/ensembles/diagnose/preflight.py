@@ -27,7 +27,7 @@ from flocsim.forces.codegen import laws_of
 from flocsim.forces.contact import impact_exponent
 from flocsim.integrators.loop.driver import advance
 from flocsim.plausibility import ROUNDING, Names, plausibility_warnings
-from flocsim.run import family, invalid_value
+from flocsim.run import invalid_value
 from flocsim.state.views import ContactView
 from flocsim.system import System
 
@@ -90,8 +90,7 @@ def check_laws(pair: Encounter) -> None:
         if not isinstance(force, PairForce | ContactForce):
             continue
         own = laws_of([force], system.fluid)
-        views = {key: [*samples_of(force)] for key in map(family, own.laws)}
-        if words := invalid_value(force, own, views, system.fluid):
+        if words := invalid_value(force, own, samples_of(force), system.fluid):
             raise KernelError(
                 f"{name}: {words}, which every collision reaches: bound whatever it divides by or "
                 "takes a root, power or logarithm of, as in max(pair.gap, 1e-10)"

@@ -39,56 +39,42 @@ def travel_limit(scene):
     return TRAVEL * total / max(free, 1)
 
 
-def mean_displacement(scene, work, state):
-    """Return the mean displacement (x, y) [m] of all bodies since the listing; 0 if one is
+def motion_of_body(work, state, body, is_speed):
+    """Return the displacement (x, y) [m] of a body since the listing, in a state; or its present
+    velocity [m/s]."""
+    if is_speed:
+        return work.velocity[NOW, body, X], work.velocity[NOW, body, Y]
+    pose = work.poses[body]
+    return work.place[state, body, X] - pose.listed_x, work.place[state, body, Y] - pose.listed_y
+
+
+def largest_motion(scene, work, state, is_speed):
+    """Return the largest of these relative to the mean of all bodies, or to rest if one is
     fixed."""
-    x = y = 0.0
-    for body in range(scene.bodies.shape[0]):
-        pose = work.poses[body]
-        if scene.bodies[body].free == 0.0:
-            return 0.0, 0.0
-        x += work.place[state, body, X]
-        x -= pose.listed_x
-        y += work.place[state, body, Y]
-        y -= pose.listed_y
-    return x / scene.bodies.shape[0], y / scene.bodies.shape[0]
-
-
-def mean_velocity(scene, work):
-    """Return the mean velocity (x, y) [m/s] of all bodies; 0 if one is fixed."""
-    x = y = 0.0
-    for body in range(scene.bodies.shape[0]):
-        if scene.bodies[body].free == 0.0:
-            return 0.0, 0.0
-        x += work.velocity[NOW, body, X]
-        y += work.velocity[NOW, body, Y]
-    return x / scene.bodies.shape[0], y / scene.bodies.shape[0]
+    count, all_free = scene.bodies.shape[0], 1.0
+    mean_x, mean_y, largest = 0.0, 0.0, 0.0
+    for body in range(count):
+        x, y = motion_of_body(work, state, body, is_speed)
+        mean_x, mean_y = mean_x + x / count, mean_y + y / count
+        all_free = min(all_free, scene.bodies[body].free)
+    for body in range(count):
+        x, y = motion_of_body(work, state, body, is_speed)
+        largest = max(largest, length_of(x - all_free * mean_x, y - all_free * mean_y))
+    return largest
 
 
 @hook
 def travelled_share(scene, work, state):
     """Return the largest displacement relative to the mean since the listing, over its limit."""
-    most, furthest = travel_limit(scene), 0.0
-    drift_x, drift_y = mean_displacement(scene, work, state)
-    for body in range(scene.bodies.shape[0]):
-        pose = work.poses[body]
-        x = work.place[state, body, X] - pose.listed_x - drift_x
-        y = work.place[state, body, Y] - pose.listed_y - drift_y
-        furthest = max(furthest, length_of(x, y))
-    return furthest / most
+    return largest_motion(scene, work, state, False) / travel_limit(scene)
 
 
 @hook
 def time_to_travel(scene, work, share):
     """Return the time [s] in which no body uses more than a share of its limit, at constant
     speed."""
-    most, fastest = travel_limit(scene), 0.0
-    drift_x, drift_y = mean_velocity(scene, work)
-    for body in range(scene.bodies.shape[0]):
-        x = work.velocity[NOW, body, X] - drift_x
-        y = work.velocity[NOW, body, Y] - drift_y
-        fastest = max(fastest, length_of(x, y))
-    return share * most / fastest if fastest > 0.0 else math.inf
+    fastest = largest_motion(scene, work, NOW, True)
+    return share * travel_limit(scene) / fastest if fastest > 0.0 else math.inf
 
 
 @hook

@@ -20,6 +20,7 @@ from flocsim.geometry.contact.near_pairs import gap_between, list_polygons
 from flocsim.geometry.contact.points import (
     contact_point,
     length_of,
+    relative_velocity,
     separation,
     tangential_component,
 )
@@ -207,10 +208,7 @@ def relative_speed(scene, work, a, b):
     It is the rate of `relative_displacement`.
     """
     x, y = separation(scene, work, NOW, a, b)
-    vx, vy = (
-        work.velocity[NOW, a, X] - work.velocity[NOW, b, X],
-        work.velocity[NOW, a, Y] - work.velocity[NOW, b, Y],
-    )
+    vx, vy = relative_velocity(work, NOW, a, b)
     spin_a, spin_b = work.velocity[NOW, a, ANGLE], work.velocity[NOW, b, ANGLE]
     turning = abs(spin_a - spin_b)
     seen_from_b = length_of(vx + spin_b * y, vy - spin_b * x) + turning * core_radius(scene, a)

@@ -55,31 +55,6 @@ grow without bound with opposite signs."""
 DENSE = 2000
 """Up to this number of charges the system is dense, beyond that sparse."""
 
-EULER = 0.5772156649015329
-
-# Power series of K₀ and K₁ for z < 2: 1/(k! (k+1)!), k + 1, and the harmonic number H_k.
-SERIES = (
-    (1.0, 1.0, 0.0), (0.5, 2.0, 1.0), (1.0 / 12.0, 3.0, 1.5), (1.0 / 144.0, 4.0, 11.0 / 6.0),
-    (1.0 / 2880.0, 5.0, 25.0 / 12.0), (1.0 / 86400.0, 6.0, 137.0 / 60.0),
-    (1.0 / 3628800.0, 7.0, 49.0 / 20.0), (1.0 / 203212800.0, 8.0, 363.0 / 140.0),
-    (1.0 / 14631321600.0, 9.0, 761.0 / 280.0), (1.0 / 1316818944000.0, 10.0, 7129.0 / 2520.0),
-)  # fmt: skip
-
-# √z e^z K₀(z) and √z e^z K₁(z) for z ≥ 2 in powers of 2/z, fitted at Chebyshev nodes.
-LARGE = (
-    (1.2533141372113017, 1.2533141374358714),
-    (-0.07833210681280316, 0.23499636984375394),
-    (0.022029757551244873, -0.03671685544964848),
-    (-0.011454546191375332, 0.016041297300667053),
-    (0.008603361751599913, -0.011086128285228548),
-    (-0.00787235110707216, 0.00969849238287851),
-    (0.007294077192005892, -0.0087724646921607),
-    (-0.0057274232895346035, 0.006801024176912822),
-    (0.003275010897498367, -0.003861796984701152),
-    (-0.0011602923403642548, 0.0013625930013402396),
-    (0.00018755861732605998, -0.0002196952815597351),
-)
-
 GRID_STEP = 0.3
 
 LAYER_REACH = 12.0
@@ -91,6 +66,10 @@ FIELD_DEPTH = 1.0
 
 LEAST_SQUARED = 1e-4
 """Lower bound of (κρ)² in the field of a charge, which diverges at ρ = 0."""
+
+BESSEL_STEPS = 256.0
+"""Rows of the table of Bessel functions per unit of ln z²: cubic polynomials in between are within
+1e-9 of them."""
 
 MOST_NODES = 2_000_000
 """Largest number of nodes of a body's field: 64 MB."""
@@ -259,24 +238,28 @@ def layer_energy(
     return float(a[:, 2] @ k0(kappa * distances(placed, b)) @ b[:, 2])
 
 
-def bessel_pair(squared):
-    """Return (K₀(z), K₁(z)/z) for z²."""
-    if squared < 4.0:
-        t = 0.25 * squared
-        log, power, zero, first = 0.5 * math.log(t) + EULER, 1.0, 0.0, 0.0
-        for factor, next_k, harmonic in SERIES:
-            part = factor * power
-            zero += next_k * part * (harmonic - log)
-            first += part * (log - harmonic - 0.5 / next_k)
-            power *= t
-        return zero, 1.0 / squared + 0.5 * first
-    z = math.sqrt(squared)
-    u, zero, first = 2.0 / z, 0.0, 0.0
-    for k in range(len(LARGE)):
-        of_zero, of_first = LARGE[len(LARGE) - 1 - k]
-        zero, first = zero * u + of_zero, first * u + of_first
-    fall = math.exp(-z) / math.sqrt(z)
-    return zero * fall, first * fall / z
+def bessel_table() -> np.ndarray:
+    """Return K₀(z), K₁(z)/z and the slopes of both per row, in rows at even steps of ln z²."""
+    from scipy.special import k0, k1, kn
+
+    ends = math.log(LEAST_SQUARED), 2.0 * math.log(LAYER_REACH + 2.0)
+    z = np.exp(0.5 * np.arange(*ends, 1.0 / BESSEL_STEPS))
+    # The derivatives by ln z² are −z K₁/2 and −K₂/2.
+    slopes = z * k1(z), kn(2, z)
+    return np.column_stack([k0(z), k1(z) / z, *(-0.5 / BESSEL_STEPS * np.array(slopes))])
+
+
+def bessel_pair(bessel, squared):
+    """Return (K₀(z), K₁(z)/z) for z², interpolated in the table by cubic Hermite polynomials."""
+    place = math.log(squared / LEAST_SQUARED) * BESSEL_STEPS
+    row = int(place)
+    t = place - row
+    s = 1.0 - t
+    # Of the values at both ends, and of the slopes there.
+    a, b, c, d = s * s * (1.0 + 2.0 * t), t * t * (3.0 - 2.0 * t), t * s * s, -t * t * s
+    zero = a * bessel[row, 0] + b * bessel[row + 1, 0] + c * bessel[row, 2] + d * bessel[row + 1, 2]
+    first = a * bessel[row, 1] + b * bessel[row + 1, 1]
+    return zero, first + c * bessel[row, 3] + d * bessel[row + 1, 3]
 
 
 class Field(NamedTuple):
@@ -301,7 +284,7 @@ def list_groups(groups, x, y, reach, near):
     return count
 
 
-def field_at(groups, charges, near, count, kappa, x, y):
+def field_at(bessel, groups, charges, near, count, kappa, x, y):
     """Return φ, ∂φ/∂x, ∂φ/∂y [1/m] and ∂²φ/∂x∂y [1/m²] of the listed groups at a point."""
     value, by_x, by_y, by_both = 0.0, 0.0, 0.0, 0.0
     for k in range(count):
@@ -313,7 +296,7 @@ def field_at(groups, charges, near, count, kappa, x, y):
             if squared > (LAYER_REACH + 1.0) * (LAYER_REACH + 1.0):
                 continue
             squared = max(squared, LEAST_SQUARED)
-            zero, first = bessel_pair(squared)
+            zero, first = bessel_pair(bessel, squared)
             size = charge.strength
             # K₀' = −K₁, so ∂φ/∂x = −q κ² (K₁(z)/z) dx, and K₂ = K₀ + 2 K₁/z in the mixed
             # derivative.
@@ -325,7 +308,7 @@ def field_at(groups, charges, near, count, kappa, x, y):
     return value, by_x, by_y, by_both
 
 
-def fill_tiles(groups, charges, kappa, step, corners, near, field):
+def fill_tiles(bessel, groups, charges, kappa, step, corners, near, field):
     """Write the nodes of tiles with the given lower left corners (m, 2); ``near`` is scratch."""
     side, half = TILE + 1, 0.5 * TILE * step
     for tile in range(corners.shape[0]):
@@ -335,7 +318,7 @@ def fill_tiles(groups, charges, kappa, step, corners, near, field):
         for node in range(side * side):
             x = corners[tile, 0] + step * (node % side)
             y = corners[tile, 1] + step * (node // side)
-            value, by_x, by_y, by_both = field_at(groups, charges, near, count, kappa, x, y)
+            value, by_x, by_y, by_both = field_at(bessel, groups, charges, near, count, kappa, x, y)
             known = field[tile * side * side + node]
             # Derivatives per grid step, as Hermite interpolation needs them.
             known.potential = value
@@ -383,7 +366,8 @@ def field_of_shape(shape: Shape, kappa: float) -> Field:
     field = FieldNode.rows(nodes)
     groups, _, charges = grouped_charges(shape, kappa)
     near = np.zeros(len(groups), np.int64)
-    compiled(fill_tiles)(groups, charges, kappa, step, corners, near, field)
+    bessel = bessel_table()
+    compiled(fill_tiles)(bessel, groups, charges, kappa, step, corners, near, field)
     grid = Grid.rows(1)
     grid["x"], grid["y"] = low
     grid["across"], grid["up"] = counts

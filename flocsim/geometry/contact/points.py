@@ -57,12 +57,29 @@ def length_of(x, y):
     return math.sqrt(x * x + y * y)
 
 
+def unit_vector(x, y):
+    """Return (n_x, n_y, length) of a vector; any direction will do for one of no length."""
+    length = length_of(x, y)
+    if length == 0.0:
+        return 0.0, 1.0, length
+    return x / length, y / length, length
+
+
+def difference(vectors, state, a, b):
+    """Return (x, y) of body a less that of body b, of positions or velocities in a state."""
+    x = vectors[state, a, X] - vectors[state, b, X]
+    return x, vectors[state, a, Y] - vectors[state, b, Y]
+
+
 @hook
 def separation(scene, work, state, a, b):
     """Return the vector (x, y) [m] from the centroid of body b to that of body a, in a state."""
-    return work.place[state, a, X] - work.place[state, b, X], work.place[state, a, Y] - work.place[
-        state, b, Y
-    ]
+    return difference(work.place, state, a, b)
+
+
+def relative_velocity(work, state, a, b):
+    """Return the velocity (x, y) [m/s] of the centroid of body a relative to that of body b."""
+    return difference(work.velocity, state, a, b)
 
 
 def nearest_displacement(displacement, period):
@@ -75,8 +92,8 @@ def nearest_displacement(displacement, period):
 def nearest_image(scene, work, state, a, b):
     """Return `separation` in a periodic domain: to the image of a that is nearest to b."""
     width, height = scene.box
-    x = nearest_displacement(work.place[state, a, X] - work.place[state, b, X], width)
-    return x, nearest_displacement(work.place[state, a, Y] - work.place[state, b, Y], height)
+    x, y = difference(work.place, state, a, b)
+    return nearest_displacement(x, width), nearest_displacement(y, height)
 
 
 PERIODIC: dict[Callable, Callable] = {separation: nearest_image}
@@ -170,10 +187,7 @@ def locate_polygons(scene, work, state, row):
     fy = sy + share * (ey - sy)
     dx = px + ox - fx
     dy = py + oy - fy
-    distance = length_of(dx, dy)
-    nx, ny = 0.0, 1.0
-    if distance > 0.0:
-        nx, ny = dx / distance, dy / distance
+    nx, ny, distance = unit_vector(dx, dy)
     # The contact point lies on the normal, midway between the two outlines.
     radius_a, radius_b = candidate.vertex_radius, candidate.edge_radius
     contact_distance = 0.5 * (distance + radius_b - radius_a)
@@ -195,10 +209,7 @@ def locate_spheres(scene, work, state, row):
     a = candidate.vertex_body
     b = candidate.edge_body
     ox, oy = separation(scene, work, state, a, b)
-    distance = length_of(ox, oy)
-    nx, ny = 0.0, 1.0
-    if distance > 0.0:
-        nx, ny = ox / distance, oy / distance
+    nx, ny, distance = unit_vector(ox, oy)
     contact_distance = 0.5 * (distance + scene.bodies[b].radius - scene.bodies[a].radius)
     gap = distance - scene.bodies[a].radius - scene.bodies[b].radius
     bx, by = contact_distance * nx, contact_distance * ny

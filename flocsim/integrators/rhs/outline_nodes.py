@@ -115,36 +115,16 @@ def parameter_to_gap(scene, work, piece, foot, extent, target):
 def write_nodes(nodes, rules, count, piece, foot, scale, low, high, order):
     """Append the nodes of a panel, t in [low, high], on a piece graded from a foot; see the
     module."""
-    # Loops over few arrays each are vectorised by LLVM.
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     for k in range(order):
         # Gauss's node and weight in t; ds/dt = 2 scale (1 + t²)/(1 − t²)².
         t = middle + half * rules[order, 0, k]
         factor = 1.0 / (1.0 - t * t)
         part = 2.0 * half * rules[order, 1, k] * abs(scale) * (1.0 + t * t) * factor * factor
-        nodes.weight[count + k] = part
-        nodes.attraction[count + k] = foot + 2.0 * scale * t * factor
-    # Segment: the parameter is arc length.
-    if piece.arc_radius == 0.0:
-        for k in range(order):
-            parameter = nodes.attraction[count + k]
-            nodes.x[count + k] = piece.x + parameter * piece.direction_x
-            nodes.y[count + k] = piece.y + parameter * piece.direction_y
-        for k in range(order):
-            nodes.normal_x[count + k] = piece.direction_y
-            nodes.normal_y[count + k] = -piece.direction_x
-    else:
-        for k in range(order):
-            parameter = nodes.attraction[count + k]
-            factor = 1.0 / (1.0 + parameter * parameter)
-            c, s = (1.0 - parameter * parameter) * factor, 2.0 * parameter * factor
-            nodes.normal_x[count + k] = c * piece.direction_x - s * piece.direction_y
-            nodes.normal_y[count + k] = c * piece.direction_y + s * piece.direction_x
-            nodes.weight[count + k] *= 2.0 * piece.arc_radius * factor
-        for k in range(order):
-            nodes.x[count + k] = piece.x + piece.arc_radius * nodes.normal_x[count + k]
-            nodes.y[count + k] = piece.y + piece.arc_radius * nodes.normal_y[count + k]
-    for k in range(order):
+        x, y, nx, ny, metres = at_parameter(piece, foot + 2.0 * scale * t * factor)
+        nodes.x[count + k], nodes.y[count + k] = x, y
+        nodes.normal_x[count + k], nodes.normal_y[count + k] = nx, ny
+        nodes.weight[count + k] = metres * part
         nodes.gap[count + k], nodes.attraction[count + k] = math.inf, 0.0
 
 
@@ -234,17 +214,11 @@ def next_bend(scene, work, piece, foot, scale, low, last, gap):
         else:
             # Where two faces meet in a reflex corner: on the bisector of their normals.
             next_piece = piece_at(scene.pieces, near.around[1 + (j + 1) % count])
-            x, y = (
-                other.x + other.half * other.direction_x,
-                other.y + other.half * other.direction_y,
-            )
-            dx = next_piece.x - next_piece.half * next_piece.direction_x - x
-            dy = next_piece.y - next_piece.half * next_piece.direction_y - y
+            x, y, nx, ny, _ = at_parameter(other, other.half)
+            x_2, y_2, nx_2, ny_2, _ = at_parameter(next_piece, -next_piece.half)
+            dx, dy = x_2 - x, y_2 - y
             if next_piece.arc_radius == 0.0 and dx * dx + dy * dy < 1e-12 * other.half * other.half:
-                nx, ny = (
-                    other.direction_y + next_piece.direction_y,
-                    -other.direction_x - next_piece.direction_x,
-                )
+                nx, ny = nx + nx_2, ny + ny_2
                 length = math.sqrt(nx * nx + ny * ny)
                 bend_parameter = ray_parameter(piece, x, y, (nx / length, ny / length), gap)
                 bend = earlier_bend(bend_parameter, foot, scale, low, bend)

@@ -29,7 +29,7 @@ from flocsim.hooks import ORIENTED_ENERGY, OUTLINE_PRESSURE, has, hook, outline_
 from flocsim.integrators.rhs.charge_sum import sum_charges
 from flocsim.integrators.rhs.orientation import oriented_forces_at
 from flocsim.integrators.rhs.outline_nodes import MOST_PANELS, find_feet, gap_expansion, write_side
-from flocsim.integrators.rhs.views import effective_mass
+from flocsim.integrators.rhs.views import centre_line, effective_mass
 from flocsim.state.bodies import ANGLE
 from flocsim.state.outlines import (
     MOST_NODES,
@@ -50,18 +50,14 @@ further than (1 + MOST_SKIN) times as far as needed."""
 AT_ORIGIN = Pose(0.0, 0.0, 1.0, 0.0)
 """Pose of the body in whose frame the sum is evaluated."""
 
-VECTOR_WIDTH = 8
-"""Nodes that a processor evaluates in one vector at most."""
-
 
 def list_near_pieces(scene, work, a, b, pose, reach):
     """List the pieces of two bodies that are nearer to each other than ``reach`` [m]."""
     near, listed = work.near, work.listed
     # First against the other body's bounding circle, then piece against piece.
-    list_within(scene.pieces, near.first, scene.first_piece[a], scene.first_piece[a + 1],
-                pose, 0.0, 0.0, scene.bodies[b].bounding_radius + reach)  # fmt: skip
-    list_within(scene.pieces, near.second, scene.first_piece[b], scene.first_piece[b + 1],
-                AT_ORIGIN, pose.x, pose.y, scene.bodies[a].bounding_radius + reach)  # fmt: skip
+    bound_a, bound_b = scene.bodies[a].bounding_radius, scene.bodies[b].bounding_radius
+    list_within(scene, near.first, a, pose, 0.0, 0.0, bound_b + reach)
+    list_within(scene, near.second, b, AT_ORIGIN, pose.x, pose.y, bound_a + reach)
     keep_close_pieces(scene.pieces, near.first, pose, near.second, AT_ORIGIN, reach)
     keep_close_pieces(scene.pieces, near.second, AT_ORIGIN, near.first, pose, reach)
     listed.first_body, listed.second_body, listed.reach = a, b, reach
@@ -69,12 +65,11 @@ def list_near_pieces(scene, work, a, b, pose, reach):
     listed.cosine, listed.sine = pose.cosine, pose.sine
 
 
-def list_within(pieces, rows, first, last, pose, x, y, reach):
-    """List those of the pieces ``first`` to ``last`` of a body in a Pose that may be within
-    ``reach`` of a point [m]."""
+def list_within(scene, rows, body, pose, x, y, reach):
+    """List those pieces of a body in a Pose that may be within ``reach`` of a point [m]."""
     count = 0
-    for row in range(first, last):
-        piece = placed(pieces, row, pose)
+    for row in range(scene.first_piece[body], scene.first_piece[body + 1]):
+        piece = placed(scene.pieces, row, pose)
         dx, dy, most = piece.middle_x - x, piece.middle_y - y, reach + piece.extent
         if dx * dx + dy * dy < most * most:
             count += 1
@@ -151,7 +146,7 @@ def evaluate_nodes(scene, work, count, inset, lens):
     for j in range(near.seen[0]):
         piece = piece_at(scene.pieces, near.seen[1 + j])
         if piece.arc_radius > 0.0:
-            add_arc(work.nodes, count, piece, inset, lens)
+            add_arc(work.nodes, work.rules, count, piece, inset, lens)
         else:
             add_segment(work.nodes, count, piece, inset, lens)
     convert_to_plate_gaps(work.nodes, count, inset, lens)
@@ -159,25 +154,17 @@ def evaluate_nodes(scene, work, count, inset, lens):
 
 def sum_nodes(scene, work, total, count, setup):
     """Add (fx, fy, torque about the origin) of the first ``count`` nodes to a total."""
-    inset, lens, view = setup
+    inset, lens, _, time, sizes = setup
     fx, fy, torque = total
     nodes = work.nodes
-    # Pad to whole vectors with copies of the last node, which the sum skips.
-    whole = -(-count // VECTOR_WIDTH) * VECTOR_WIDTH
-    for k in range(count, whole):
-        nodes.x[k], nodes.y[k] = nodes.x[count - 1], nodes.y[count - 1]
-        nodes.gap[k], nodes.attraction[k] = nodes.gap[count - 1], nodes.attraction[count - 1]
-    evaluate_nodes(scene, work, whole, inset, lens)
+    evaluate_nodes(scene, work, count, inset, lens)
     for k in range(count):
         gap = nodes.gap[k]
         if gap < lens:
             parted, plates = gap + inset, nodes.plate_gap[k]
             # The more an outline curves away, the nearer is all that attracts. For circles this gap
             # gives the fraction lost to a finite depth within 1 %, up to a gap of a third of it.
-            point = OutlineView(
-                view.time, gap, parted, plates, parted * parted / plates, view.depth, view.radius_i,
-                view.radius_j, view.reduced_radius, view.effective_mass,
-            )  # fmt: skip
+            point = OutlineView(time, gap, parted, plates, parted * parted / plates, *sizes)
             size = -outline_pressure(scene, point) * nodes.weight[k]
             x, y = nodes.x[k], nodes.y[k]
             across, up = size * nodes.normal_x[k], size * nodes.normal_y[k]
@@ -220,10 +207,11 @@ def lens_radius(scene, least):
 
 
 def prepare_sum(scene, work, time, a, b, pose):
-    """Return (inset, lens, OutlineView) of body a in a Pose; list the pieces within the lens.
+    """Return (inset, lens, least gap, time, sizes) of body a in a Pose; list the pieces within the
+    lens.
 
     ``lens`` is 0 if nothing acts. ``inset`` [m] is how far outlines nearer than d_min are moved
-    apart.
+    apart; ``sizes`` are the last fields of an OutlineView.
     """
     reach, floor, _, _ = scene.outlines
     # Lists are a superset of what counts, so when they were made does not affect the sum.
@@ -240,11 +228,9 @@ def prepare_sum(scene, work, time, a, b, pose):
         if lens > 0.0:
             list_near_pieces(scene, work, a, b, pose, (1.0 + SKIN) * lens)
     radius_a, radius_b = radii_of(scene, a, b)
-    view = OutlineView(
-        time, least, least, least, least, depth_of(scene, a, b), radius_a, radius_b,
-        radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
-    )  # fmt: skip
-    return max(0.0, floor - least), lens, view
+    reduced = radius_a * radius_b / (radius_a + radius_b)
+    sizes = depth_of(scene, a, b), radius_a, radius_b, reduced, effective_mass(scene, a, b)
+    return max(0.0, floor - least), lens, least, time, sizes
 
 
 def out_of_reach(scene, a, b, pose):
@@ -263,10 +249,10 @@ def sum_pressure(scene, work, time, a, b, x, y, cosine, sine):
     if out_of_reach(scene, a, b, pose):
         return total
     setup = prepare_sum(scene, work, time, a, b, pose)
-    inset, lens, view = setup
+    inset, lens, least_gap, _, sizes = setup
     if lens == 0.0:
         return total
-    count, least, work.near.seen[0] = 0, view.gap + inset, 0
+    count, least, work.near.seen[0] = 0, least_gap + inset, 0
     for i in range(work.near.first[0]):
         piece = placed(scene.pieces, work.near.first[1 + i], pose)
         if list_around_piece(scene, work, piece, lens) == 0:
@@ -279,18 +265,17 @@ def sum_pressure(scene, work, time, a, b, x, y, cosine, sine):
             growth = gap_expansion(scene, work, piece, foot)
             low = first if k == 0 else 0.5 * (work.feet[k - 1] + foot)
             high = last if k == feet - 1 else 0.5 * (work.feet[k + 1] + foot)
-            if low < foot:
-                count = write_side(scene, work, count, piece, foot, growth, low, inset, lens, least)
-            if foot < high:
-                count = write_side(
-                    scene, work, count, piece, foot, growth, high, inset, lens, least
-                )
+            for end in (low, high):
+                if end != foot:
+                    count = write_side(
+                        scene, work, count, piece, foot, growth, end, inset, lens, least
+                    )
             # Work in batches of at most MOST_NODES.
             if count > MOST_NODES - 2 * MOST_PANELS * MOST_ORDER:
                 total = sum_nodes(scene, work, total, count, setup)
                 count = 0
     fx, fy, torque = sum_nodes(scene, work, total, count, setup)
-    return view.depth * fx, view.depth * fy, view.depth * torque
+    return sizes[0] * fx, sizes[0] * fy, sizes[0] * torque
 
 
 def outline_forces_at(scene, work, time, a, b, x, y, angle_a, angle_b):
@@ -345,12 +330,10 @@ def forces_in_frame(scene, work, time, a, b, x, y, angle_a, angle_b):
 def outline_repulsion(scene, work, time, a, b, displacement):
     """Return the repulsion of two bodies along the line of centres [N], with a moved out along it
     by ``displacement`` [m]."""
-    x, y = separation(scene, work, NOW, a, b)
-    distance = length_of(x, y)
-    nx, ny = (x / distance, y / distance) if distance > 0.0 else (0.0, 1.0)
+    nx, ny, distance = centre_line(scene, work, NOW, a, b)
     angle_a, angle_b = work.place[NOW, a, ANGLE], work.place[NOW, b, ANGLE]
     # Move a out, keeping its orientation.
-    x, y = x + displacement * nx, y + displacement * ny
+    x, y = (distance + displacement) * nx, (distance + displacement) * ny
     fx, fy, _, _ = outline_forces_at(scene, work, time, a, b, x, y, angle_a, angle_b)
     return fx * nx + fy * ny
 

@@ -59,55 +59,50 @@ def interval_of(scene, gap):
     return interval, min(max(place - interval, 0.0), 1.0)
 
 
-def column(scene, interval, share, which):
+def column(scene, place, which):
     """Return the value of a column of the tables there: a cubic per interval."""
-    c = scene.pair_table
+    c, (interval, share) = scene.pair_table, place
     found = c[interval, which, 3] * share + c[interval, which, 2]
     return (found * share + c[interval, which, 1]) * share + c[interval, which, 0]
 
 
-def column_slope(scene, interval, share, which, gap):
+def column_slope(scene, place, which, gap):
     """Return the derivative of a column by the gap there."""
-    c = scene.pair_table
+    c, (interval, share) = scene.pair_table, place
     found = 3.0 * c[interval, which, 3] * share + 2.0 * c[interval, which, 2]
     return (found * share + c[interval, which, 1]) * NODES_A_UNIT / gap
 
 
-def write_row(work, row, one, two, load):
-    """Write one q: entries (v_n, v_t, spin) of body 1 and of body 2, and its load."""
-    s = work.squares
-    s[row, 0], s[row, 1], s[row, 2] = one
-    s[row, 3], s[row, 4], s[row, 5] = two
-    s[row, LOAD] = load
+def write_row(work, row, direction, one, two, load):
+    """Write one q and its load, given its entries (v_n, v_t, spin) of body 1 and of body 2.
+
+    Rows stand along x and y; ``direction`` is n.
+    """
+    s, (nx, ny) = work.squares, direction
+    s[row, 0], s[row, 1] = one[0] * nx - one[1] * ny, one[0] * ny + one[1] * nx
+    s[row, 3], s[row, 4] = two[0] * nx - two[1] * ny, two[0] * ny + two[1] * nx
+    s[row, 2], s[row, 5], s[row, LOAD] = one[2], two[2], load
 
 
-def row_times(work, row, motion):
-    """Return q·v of a row and velocities (6,)."""
-    s = work.squares
-    return (
-        s[row, 0] * motion[0] + s[row, 1] * motion[1] + s[row, 2] * motion[2]
-        + s[row, 3] * motion[3] + s[row, 4] * motion[4] + s[row, 5] * motion[5]
-    )  # fmt: skip
+def row_times(work, row, one, two):
+    """Return q·v of a row and the velocities (v_x, v_y, spin) of body 1 and of body 2."""
+    s, total = work.squares, 0.0
+    for k in range(3):
+        total += s[row, k] * one[k] + s[row, 3 + k] * two[k]
+    return total
 
 
-def motion_in(work, state, one, two, nx, ny):
-    """Return (v_n, v_t, spin) of both bodies in a state."""
-    x, y = work.velocity[state, one, X], work.velocity[state, one, Y]
-    x_2, y_2 = work.velocity[state, two, X], work.velocity[state, two, Y]
-    return (
-        x * nx + y * ny, y * nx - x * ny, work.velocity[state, one, ANGLE],
-        x_2 * nx + y_2 * ny, y_2 * nx - x_2 * ny, work.velocity[state, two, ANGLE],
-    )  # fmt: skip
+def velocity_in(work, state, body):
+    """Return (v_x, v_y, spin) of a body in a state."""
+    v = work.velocity
+    return v[state, body, X], v[state, body, Y], v[state, body, ANGLE]
 
 
-def relative_to_flow(scene, work, state, one, two, nx, ny, motion):
-    """Return the same relative to the flow at each body."""
-    u, v, spin = flow_in(scene, work, state, one)
-    u_2, v_2, _ = flow_in(scene, work, state, two)
-    return (
-        motion[0] - u * nx - v * ny, motion[1] - v * nx + u * ny, motion[2] - spin,
-        motion[3] - u_2 * nx - v_2 * ny, motion[4] - v_2 * nx + u_2 * ny, motion[5] - spin,
-    )  # fmt: skip
+def relative_to_flow(scene, work, state, body):
+    """Return the same relative to the flow at the body."""
+    vx, vy, spin = velocity_in(work, state, body)
+    u, v, turning = flow_in(scene, work, state, body)
+    return vx - u, vy - v, spin - turning
 
 
 def flow_in(scene, work, state, body):
@@ -128,33 +123,25 @@ def strain_along(scene, nx, ny):
     return e_xx * cosine + e_xy * sine, e_xy * cosine - e_xx * sine
 
 
-def write_common(scene, work, place, e_nn, e_nt):
+def write_common(scene, work, direction, place, e_nn, e_nt):
     """Write the rows of common motion, which is relative to the flow."""
-    interval, share = place
-    first = column(scene, interval, share, N_1)
-    other = column(scene, interval, share, N_2)
-    load = column(scene, interval, share, K_N) * e_nn
-    write_row(work, COMMON, (first, 0.0, 0.0), (other, 0.0, 0.0), load)
+    first, other = column(scene, place, N_1), column(scene, place, N_2)
+    load = column(scene, place, K_N) * e_nn
+    write_row(work, COMMON, direction, (first, 0.0, 0.0), (other, 0.0, 0.0), load)
     for row, v, w, k in ((1, A_V1, A_W1, K_A), (2, B_V1, B_W1, K_B)):
-        first = column(scene, interval, share, v)
-        other = column(scene, interval, share, v + 1)
-        turn_1 = column(scene, interval, share, w)
-        turn_2 = column(scene, interval, share, w + 1)
-        load = column(scene, interval, share, k) * e_nt
-        write_row(work, COMMON + row, (0.0, first, turn_1), (0.0, other, turn_2), load)
+        one = 0.0, column(scene, place, v), column(scene, place, w)
+        two = 0.0, column(scene, place, v + 1), column(scene, place, w + 1)
+        write_row(work, COMMON + row, direction, one, two, column(scene, place, k) * e_nt)
 
 
-def write_relative(scene, work, place, arm, arm_2):
+def write_relative(scene, work, direction, place, arm, arm_2):
     """Write the rows of relative motion: the rate of the gap, and sliding at its middle."""
-    interval, share = place
-    opening_root = column(scene, interval, share, GAP)
-    sliding_root = column(scene, interval, share, SLIDE)
-    mixed = column(scene, interval, share, MIXED)
-    turning_root = column(scene, interval, share, TURN)
-    write_row(work, RELATIVE, (-opening_root, 0.0, 0.0), (opening_root, 0.0, 0.0), 0.0)
-    one, two = -sliding_root * arm - mixed, -sliding_root * arm_2 + mixed
-    write_row(work, RELATIVE + 1, (0.0, -sliding_root, one), (0.0, sliding_root, two), 0.0)
-    write_row(work, RELATIVE + 2, (0.0, 0.0, -turning_root), (0.0, 0.0, turning_root), 0.0)
+    opening, sliding = column(scene, place, GAP), column(scene, place, SLIDE)
+    mixed, turning = column(scene, place, MIXED), column(scene, place, TURN)
+    write_row(work, RELATIVE, direction, (-opening, 0.0, 0.0), (opening, 0.0, 0.0), 0.0)
+    one, two = -sliding * arm - mixed, -sliding * arm_2 + mixed
+    write_row(work, RELATIVE + 1, direction, (0.0, -sliding, one), (0.0, sliding, two), 0.0)
+    write_row(work, RELATIVE + 2, direction, (0.0, 0.0, -turning), (0.0, 0.0, turning), 0.0)
 
 
 def water_radius(scene, body):
@@ -192,47 +179,39 @@ def write_squares(scene, work, state, one, two):
     """Write the resistance of two bodies to ``work.squares``.
 
     Return (fraction that counts, derivative of the relative resistance along the gap by the gap of
-    the outlines [N s/m²], direction n_x, n_y from 1 to 2).
+    the outlines [N s/m²]).
     """
+    # From body 1 to body 2.
     nx, ny, distance = centre_line(scene, work, state, two, one)
+    direction = nx, ny
     radius = water_radius(scene, one)
     sizes = radius + water_radius(scene, two)
     far, _ = fading(distance - sizes, scene.water.cut)
     if far == 0.0:
-        return 0.0, 0.0, nx, ny
+        return 0.0, 0.0
     # Common motion, at the gap of the spheres.
     floor, slope = scene.water.floor, 0.0
     gap = max(distance - sizes, floor)
     e_nn, e_nt = strain_along(scene, nx, ny)
-    write_common(scene, work, interval_of(scene, gap), e_nn, e_nt)
+    write_common(scene, work, direction, interval_of(scene, gap), e_nn, e_nt)
     # Relative motion, at the gap between outlines and spheres; sliding acts in the middle of the
     # gap.
     arm = distance * (radius + 0.5 * gap) / (sizes + gap)
     found, sensitivity = relative_gap(scene, work, state, distance - sizes)
     gap = max(found, floor)
     place = interval_of(scene, gap)
-    write_relative(scene, work, place, arm, distance - arm)
+    write_relative(scene, work, direction, place, arm, distance - arm)
     # Below ``floor`` the resistance is constant.
     if found > floor:
-        interval, share = place
-        size = column(scene, interval, share, GAP)
-        slope = 2.0 * far * sensitivity * size * column_slope(scene, interval, share, GAP, gap)
-    # Tension by the strain, on bodies that are held together.
-    t_n, t_t, t_s = strain_tension(scene, place, distance / (sizes + found))
-    t_n, t_t, t_s = t_n * e_nn, t_t * e_nt, t_s * e_nt
+        size = column(scene, place, GAP)
+        slope = 2.0 * far * sensitivity * size * column_slope(scene, place, GAP, gap)
+    # Tension, shear [N] and torque [N m] by the strain, on bodies that are held together.
+    size = distance / (sizes + found)
+    t_n, t_t = size * e_nn * column(scene, place, T_N), size * e_nt * column(scene, place, T_T)
+    t_s = size * e_nt * column(scene, place, T_S)
     one_pull, two_pull = (-t_n, -t_t, -arm * t_t - t_s), (t_n, t_t, (arm - distance) * t_t + t_s)
-    write_row(work, TENSION, one_pull, two_pull, 0.0)
-    return far, slope, nx, ny
-
-
-def strain_tension(scene, place, size):
-    """Return the tension, shear [N s] and torque [N m s] per unit strain rate on two bodies held
-    together, times ``size``."""
-    interval, share = place
-    return (
-        size * column(scene, interval, share, T_N), size * column(scene, interval, share, T_T),
-        size * column(scene, interval, share, T_S),
-    )  # fmt: skip
+    write_row(work, TENSION, direction, one_pull, two_pull, 0.0)
+    return far, slope
 
 
 def sphere_drag(scene, body):
@@ -251,29 +230,25 @@ def add_pair_resistance(scene, work, state):
     s = work.squares
     for pair in range(work.tally.pairs):
         one, two = work.pairs[pair].earlier, work.pairs[pair].later
-        far, _, nx, ny = write_squares(scene, work, state, one, two)
+        far, _ = write_squares(scene, work, state, one, two)
         if far == 0.0:
             continue
-        motion = motion_in(work, state, one, two, nx, ny)
-        against = relative_to_flow(scene, work, state, one, two, nx, ny, motion)
-        (drag, turn), (drag_2, turn_2) = sphere_drag(scene, one), sphere_drag(scene, two)
+        motion, motion_2 = velocity_in(work, state, one), velocity_in(work, state, two)
+        against = relative_to_flow(scene, work, state, one)
+        against_2 = relative_to_flow(scene, work, state, two)
         # The tables hold the whole resistance: take each body's own Stokes drag off.
-        n, t, spin = drag * against[0], drag * against[1], turn * against[2]
-        n_2, t_2, spin_2 = drag_2 * against[3], drag_2 * against[4], turn_2 * against[5]
+        for body, (vx, vy, spin) in ((one, against), (two, against_2)):
+            drag, turn = sphere_drag(scene, body)
+            add_force(work, state, body, far * drag * vx, far * drag * vy, far * turn * spin)
         for row in range(SQUARES + 1):
             # Tension counts as it is.
-            size = 1.0
+            size = far
             if row < RELATIVE:
-                size = s[row, LOAD] - row_times(work, row, against)
+                size *= s[row, LOAD] - row_times(work, row, against, against_2)
             elif row < TENSION:
-                size = -row_times(work, row, motion)
-            n, t, spin = n + size * s[row, 0], t + size * s[row, 1], spin + size * s[row, 2]
-            n_2, t_2 = n_2 + size * s[row, 3], t_2 + size * s[row, 4]
-            spin_2 += size * s[row, 5]
-        # Back to x and y.
-        x, y, x_2, y_2 = n * nx - t * ny, n * ny + t * nx, n_2 * nx - t_2 * ny, n_2 * ny + t_2 * nx
-        add_force(work, state, one, far * x, far * y, far * spin)
-        add_force(work, state, two, far * x_2, far * y_2, far * spin_2)
+                size *= -row_times(work, row, motion, motion_2)
+            add_force(work, state, one, size * s[row, 0], size * s[row, 1], size * s[row, 2])
+            add_force(work, state, two, size * s[row, 3], size * s[row, 4], size * s[row, 5])
 
 
 @hook
@@ -288,16 +263,14 @@ def add_pair_damping(scene, work):
     s, jacobian = work.squares, work.jacobian
     for pair in range(work.tally.pairs):
         one, two = work.pairs[pair].earlier, work.pairs[pair].later
-        far, slope, nx, ny = write_squares(scene, work, NOW, one, two)
+        far, slope = write_squares(scene, work, NOW, one, two)
         if far == 0.0:
             continue
         blocks = (one, upper_block(work, pair), lower_block(work, pair), two)
-        opening = slope * row_times(work, RELATIVE, motion_in(work, NOW, one, two, nx, ny))
-        # Rows along x and y; R = Σ q qᵀ, less each body's own drag.
+        motion, motion_2 = velocity_in(work, NOW, one), velocity_in(work, NOW, two)
+        opening = slope * row_times(work, RELATIVE, motion, motion_2)
+        # R = Σ q qᵀ, less each body's own drag.
         for row in range(SQUARES):
-            for first in (0, 3):
-                n, t = s[row, first], s[row, first + 1]
-                s[row, first], s[row, first + 1] = n * nx - t * ny, n * ny + t * nx
             add_square(work, DAMPING, blocks, row, far)
         for body in (one, two):
             drag, turn = sphere_drag(scene, body)

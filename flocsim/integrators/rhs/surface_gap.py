@@ -58,17 +58,7 @@ def gap_from_scaled(scene, measure):
 
 def share_reach(scene, gap):
     """Return the gap up to which pairs may have a share if the least gap is this one [m]."""
-    shortest, growth, end = scene.smoothing
-    if growth == 0.0 or gap <= 0.0:
-        return gap_from_scaled(scene, scaled_gap(scene, gap) + SHARE_CUTOFF)
-    if gap < end:
-        # (g + ℓ₀/growth) grows by exp(growth · SHARE_CUTOFF) while ℓ grows; no need of u itself.
-        start = shortest / growth
-        reach = (gap + start) * math.exp(growth * SHARE_CUTOFF) - start
-        if reach <= end:
-            return reach
-        return gap_from_scaled(scene, scaled_gap(scene, gap) + SHARE_CUTOFF)
-    return gap + SHARE_CUTOFF * (shortest + growth * end)
+    return gap_from_scaled(scene, scaled_gap(scene, gap) + SHARE_CUTOFF)
 
 
 def pair_end(work, row):
@@ -216,17 +206,10 @@ def smooth_gap_gradient(work, row, end):
     for each in range(row, end):
         share = g[NOW, each].force_share
         arm_v, arm_e = g[NOW, each].vertex_arm_n, g[NOW, each].edge_arm_n
+        vertex_turn, edge_turn = share * arm_v, -share * arm_e
         # Rows list a vertex of either body; the normal of the others points the other way.
-        if work.candidates[each].vertex_body == first:
-            x, y = (
-                x + share * g[NOW, each].normal_x,
-                y + share * g[NOW, each].normal_y,
-            )
-            turn_a, turn_b = turn_a + share * arm_v, turn_b - share * arm_e
-        else:
-            x, y = (
-                x - share * g[NOW, each].normal_x,
-                y - share * g[NOW, each].normal_y,
-            )
-            turn_a, turn_b = turn_a - share * arm_e, turn_b + share * arm_v
+        if work.candidates[each].vertex_body != first:
+            share, vertex_turn, edge_turn = -share, edge_turn, vertex_turn
+        x, y = x + share * g[NOW, each].normal_x, y + share * g[NOW, each].normal_y
+        turn_a, turn_b = turn_a + vertex_turn, turn_b + edge_turn
     return (x, y, turn_a), (-x, -y, turn_b)

@@ -13,10 +13,11 @@ import math
 
 from flocsim.constants import CENTRE_SOFTENING
 from flocsim.geometry.contact.points import (
-    length_of,
     normal_component,
+    relative_velocity,
     separation,
     tangential_component,
+    unit_vector,
 )
 from flocsim.hooks import hook
 from flocsim.state.bodies import ANGLE, X, Y
@@ -158,11 +159,8 @@ def centre_line(scene, work, state, a, b):
     """Return (n_x, n_y, d_c): the unit vector from body b's centroid to body a's, and their
     distance [m]."""
     dx, dy = separation(scene, work, state, a, b)
-    distance = length_of(dx, dy)
-    # Nested bodies may be concentric; any direction will do.
-    if distance == 0.0:
-        return 0.0, 1.0, 0.0
-    return dx / distance, dy / distance, distance
+    # Nested bodies may be concentric.
+    return unit_vector(dx, dy)
 
 
 def soft_centre_line(scene, work, state, a, b):
@@ -183,7 +181,6 @@ def centre_view(scene, work, time, state, a, b):
     """Return the PairView of two bodies whose gap is that of the equivalent spheres."""
     nx, ny, distance = soft_centre_line(scene, work, state, a, b)
     # Rate of the softened distance: its gradient times the relative velocity.
-    rate = nx * (work.velocity[state, a, X] - work.velocity[state, b, X])
-    rate += ny * (work.velocity[state, a, Y] - work.velocity[state, b, Y])
+    ux, uy = relative_velocity(work, state, a, b)
     gap = distance - scene.bodies[a].equivalent_radius - scene.bodies[b].equivalent_radius
-    return pair_view(scene, time, a, b, gap, rate, distance)
+    return pair_view(scene, time, a, b, gap, nx * ux + ny * uy, distance)

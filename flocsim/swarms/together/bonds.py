@@ -27,8 +27,8 @@ from flocsim.bonds.certificate import (
     is_certain,
     is_certain_in_kicks,
     pose_change,
-    radii_of,
 )
+from flocsim.bonds.escape import radii_of
 from flocsim.bonds.rest import REST_TURNS, STABLE_POSE, is_swinging, kind_at_rest
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError

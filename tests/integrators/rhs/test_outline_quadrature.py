@@ -48,11 +48,12 @@ def halved(scene, work, a, b, x, y, cosine, sine, parts, error):
     """(fx, fy) of sum_along by halving: it knows of no feet. ``parts``: scratch."""
     pose = Pose(x, y, cosine, sine)
     numbers = prepare_sum(scene, work, 0.0, a, b, pose)
-    depth = numbers[2].depth
+    _, lens, _, _, sizes = numbers
+    depth = sizes[0]
     fx, fy = 0.0, 0.0
     for i in range(work.near.first[0]):
         piece = placed(scene.pieces, work.near.first[1 + i], pose)
-        if list_around_piece(scene, work, piece, numbers[1]) == 0:
+        if list_around_piece(scene, work, piece, lens) == 0:
             continue
         first, last = ends_of(piece)
         for k in range(PARTS):
