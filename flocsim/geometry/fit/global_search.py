@@ -108,10 +108,7 @@ def best_ring(costs, start, spread, places, picks):
     came = np.empty((count + 1, size + 1, choices), np.int64)
     best = POSSIBLE
     for first in range(choices):
-        for used in range(count + 1):
-            for place in range(size + 1):
-                for j in range(choices):
-                    least[used, place, j] = BARRED
+        least[:] = BARRED
         least[0, 0, first] = 0
         for place in range(1, size + 1):
             even = place * count // size
@@ -156,11 +153,9 @@ def descend(sums, vertices, radius, directions, steps):
         while True:
             set_bisectors(vertices, out, 0, count - 1)
             set_edge_sums(sums, radius, vertices, out, edges, 0, count - 1)
-            for k in range(count):
-                for axis in range(2):
-                    points[k, 0, axis] = vertices[k, axis]
-                    for i in range(1, choices):
-                        points[k, i, axis] = vertices[k, axis] + step * directions[i - 1, axis]
+            points[:, 0] = vertices
+            for i in range(1, choices):
+                points[:, i] = vertices + step * directions[i - 1]
             edge_costs(sums, radius, points, out, costs)
             # With the directions of what was found, its own sum can be a little higher.
             lowest = min(lowest, edges.sum())
@@ -168,8 +163,7 @@ def descend(sums, vertices, radius, directions, steps):
             if found >= lowest:
                 break
             for k in range(count):
-                for axis in range(2):
-                    moved[places[k], axis] = points[places[k], picks[k], axis]
+                moved[places[k]] = points[places[k], picks[k]]
             if not is_open(moved, 2.0 * radius):
                 break
             lowest = found
@@ -189,9 +183,7 @@ def chosen(sums, points, out, radius, longest, spread, start, rounds, vertices):
             break
         start = places[count // 2]
     if cost < POSSIBLE:
-        for k in range(count):
-            for axis in range(2):
-                vertices[k, axis] = points[places[k], 0, axis]
+        vertices[:] = points[places, 0]
     return cost
 
 
