@@ -305,7 +305,7 @@ def time_unit(times):
 
 def draw_frame(axes, paths, frame, contacts):
     """The bodies, the paths of their centres, and the points where they touch."""
-    from matplotlib.patches import PathPatch, Polygon
+    from matplotlib.patches import PathPatch
 
     for number, path in enumerate(map(np.asarray, paths)):
         colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
@@ -313,10 +313,7 @@ def draw_frame(axes, paths, frame, contacts):
     for number, body in enumerate(frame):
         colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
         look = {"facecolor": (colour, 0.3), "edgecolor": colour, "lw": 0.9}
-        if len(body) == 1:
-            axes.add_patch(Polygon(body[0], **look))
-        else:
-            axes.add_patch(PathPatch(rings_path(body), **look))
+        axes.add_patch(PathPatch(rings_path(body), **look))
     points = np.asarray(contacts, dtype=float).reshape(-1, 2)
     axes.plot(points[:, 0], points[:, 1], zorder=5, **RING)
 

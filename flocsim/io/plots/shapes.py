@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 CLASS_LIMIT = 5.0
 """r_eq [px] that separates the two size classes of Fig. 3 (the paper's 5 µm at 1 µm a pixel)."""
 
-BAR_COLOUR = "#56B4E9"
+BARS = {"color": "#56B4E9", "edgecolor": "white", "linewidth": 0.5}
 CLASS_STYLES = (("≤", "#D55E00", "o"), (">", "#0072B2", "s"))
 DODGE = 0.06
 """Shift of the two classes against each other, in steps of the axis of N."""
@@ -58,7 +58,7 @@ def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
     bins = bins_of(sizes, 0.0)
     with drawing(4.2, 2.8) as figure:
         axes = figure.subplots()
-        axes.hist(sizes, bins=bins, color=BAR_COLOUR, edgecolor="white", linewidth=0.5)
+        axes.hist(sizes, bins=bins, **BARS)
         marks = ((np.median(sizes), "median", "--"), (sizes.mean(), "mean", ":"))
         for value, name, dashes in marks:
             axes.axvline(value, color="0.25", linestyle=dashes, label=f"{name} {value:.3g} µm")
@@ -86,9 +86,7 @@ def sizes(entries: Sequence[ShapeEntry]) -> Figure:
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, word, by_volume in zip(panels, ("number", "volume"), (False, True), strict=True):
             weights = found**3 if by_volume else np.ones(found.size)
-            bars, _, _ = axes.hist(found, bins=bins, weights=weights / weights.sum(),
-                                   color=BAR_COLOUR, edgecolor="white",
-                                   linewidth=0.5)  # fmt: skip
+            bars, _, _ = axes.hist(found, bins=bins, weights=weights / weights.sum(), **BARS)
             top = max(top, bars.max())
             marks = zip(diameters_at(found, by_volume), SHARES, (":", "--", "-."), strict=True)
             for value, share, dashes in marks:
@@ -111,8 +109,7 @@ def shape(entries: Sequence[ShapeEntry]) -> Figure:
         panels = figure.subplots(2, 2).ravel()
         for axes, (name, label) in zip(panels, MEASURES.items(), strict=False):
             values = np.array([getattr(each, name) for each in found])
-            axes.hist(values, bins=bins_of(values, values.min()), color=BAR_COLOUR,
-                      edgecolor="white", linewidth=0.5)  # fmt: skip
+            axes.hist(values, bins=bins_of(values, values.min()), **BARS)
             axes.axvline(np.median(values), color="0.25", linestyle="--",
                          label=f"median {np.median(values):.3g}")  # fmt: skip
             room = 1.2 * axes.get_ylim()[1]  # for the legend above the bars
