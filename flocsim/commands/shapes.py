@@ -22,7 +22,7 @@ from flocsim.io.fit_report import format_errors, measures_in, plural, population
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import check_outputs
 from flocsim.io.plots.shapes import POPULATION_FIGURES
-from flocsim.io.plots.style import Figure
+from flocsim.io.plots.style import MICRO, Figure
 from flocsim.io.shape_library import (
     ShapeEntry,
     labelled_flocs,
@@ -31,8 +31,6 @@ from flocsim.io.shape_library import (
     write_library,
 )
 from flocsim.io.terminal import aligned
-
-MICRO = 1e6
 
 MEASURES = {
     "perim um": ("perimeter", MICRO, ".4g"),

@@ -164,19 +164,13 @@ class Study(StudyKind):
     @property
     def point_scrambles(self) -> int:
         """Of how many scrambles of Sobol's sequence the replicates are points; 0 for none."""
-        return self.scrambles
+        return self.config.scrambles
 
     def numbers(self, replicate: int) -> np.ndarray:
         """The random numbers of a replicate in [0, 1), see draws, or a point of Sobol's."""
         if self.point_scrambles:
             return point(self.config.seed, self.point_scrambles, replicate)
         return draws(self.config.seed, replicate)
-
-    @property
-    def scrambles(self) -> int:
-        """Of how many scrambles the replicates of a condition are points; 0 for independent ones,
-        and where rates follow from the points."""
-        return self.config.scrambles
 
     def share_of(
         self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray

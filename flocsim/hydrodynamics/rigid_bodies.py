@@ -452,13 +452,15 @@ def cluster_mobilities(
     Cells of cluster c are ``cells[c]`` to ``cells[c + 1]``, bodies of cell k ``starts[k]`` to
     ``starts[k + 1]``; ``grid`` (k, 4): column and row of a cell, and the mean position of its
     bodies [m]. Of the bodies: ``places`` (n, 2) [m], unwrapped across periodic boundaries,
-    ``radii`` [m] of the spheres that represent them, ``own`` (3, n) [1/m], their mobilities alone.
-    Scratch: ``shares``, ``residual`` and ``direction`` (n,), ``velocities`` (3, n), ``sums`` (4, k).
+    ``radii`` [m] of the spheres that represent them, ``own`` (3, n) [1/m], their mobilities
+    alone. Scratch: ``shares``, ``residual`` and ``direction`` (n,), ``velocities`` (3, n), ``sums``
+    (4, k).
     """
     for c in range(cells.shape[0] - 1):
         find_shares(
-            c, cells, starts, grid, places, radii, own, shares, residual, direction, velocities, sums
-        )
+            c, cells, starts, grid, places, radii, own, shares, residual, direction, velocities,
+            sums,
+        )  # fmt: skip
         cluster_velocities(c, cells, starts, grid, places, radii, own, shares, velocities, sums)
         for i in range(starts[cells[c]], starts[cells[c + 1]]):
             for k in range(3):

@@ -143,12 +143,11 @@ def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touche
     n = swarm.bodies.shape[0]
     set_discs(swarm, span, reach)
     total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
+    known = total <= pairs.shape[0]
+    if known and widen_landing(swarm, span, width, height, pairs, total, reach):
+        total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
     if total > pairs.shape[0]:
         return total
-    if widen_landing(swarm, span, width, height, pairs, total, reach):
-        total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
-        if total > pairs.shape[0]:
-            return total
     for body in range(n):
         labels[body] = body
     for pair in range(total):

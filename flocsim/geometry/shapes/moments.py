@@ -62,13 +62,11 @@ def pieces_of(parts: Sequence[Part]) -> Pieces:
 
 def ring_pieces(ring, radius, number):
     """Return the Pieces of one ring of part ``number``, as a tuple."""
-    starts, units, lengths = unit_edges(ring)
+    side_starts, side_units, side_lengths = starts, units, lengths = unit_edges(ring)
     if len(ring) == 1:
         first, turn = np.zeros(1), np.full(1, 2.0 * np.pi)
-        side_starts, side_units, side_lengths = starts, units, lengths
         at_start = at_end = lengths
     else:
-        side_starts, side_units, side_lengths = starts, units, lengths
         if len(ring) == 2:  # a segment has two sides, one in each direction
             side_starts = ring
             side_units, side_lengths = np.vstack([units, -units]), np.tile(lengths, 2)

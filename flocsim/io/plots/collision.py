@@ -11,9 +11,8 @@ import numpy as np
 
 from flocsim.io.files import Rule
 from flocsim.io.plots import style
-from flocsim.io.plots.style import CONTACT_COLOUR, Figure, drawing, plain
+from flocsim.io.plots.style import CONTACT_COLOUR, MICRO, Figure, drawing, plain
 
-MICRO = 1e6
 INSIDE_COLOUR = "#DCEBF5"
 PALE = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
 """Behind text that lines may cross."""

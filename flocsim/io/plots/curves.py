@@ -11,7 +11,7 @@ import numpy as np
 
 from flocsim.io.plots import outcomes, style
 from flocsim.io.plots.results import BARS, LABELS, PANEL_SIZE, ROOM, panel_grid
-from flocsim.io.plots.style import Figure, drawing, plain
+from flocsim.io.plots.style import MICRO, Figure, drawing, plain
 from flocsim.io.results.events import ENDS_COUNTED
 from flocsim.io.results.schema import Results
 from flocsim.io.results.strength_file import FAILED, OPENED, OPENS_AT_LEAST, Strengths
@@ -179,7 +179,6 @@ SWEEP_FIGURES: dict[str, dict[str, Callable[[Any], Figure]]] = {
 """Figures of a joined file, by the first of its groups."""
 
 
-MICRO = 1e6
 MOST_LINES = 6
 BOUND_WORDS = "no hydrodynamic interaction: upper bounds"
 WATER_WORDS = "with hydrodynamic interaction"

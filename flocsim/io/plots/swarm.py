@@ -16,6 +16,7 @@ from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from flocsim.io.files import Rule
 from flocsim.io.plots.collision import rings_path
 from flocsim.io.plots.style import (
+    MICRO,
     Figure,
     drawing,
     frame_of,
@@ -25,7 +26,6 @@ from flocsim.io.plots.style import (
 )
 from flocsim.io.results.swarm_file import GONE, POINTS, RINGS, SwarmResults, mean
 
-MICRO = 1e6
 MOST_POINTS = 160
 """Points of an outline that is drawn: arcs finer than a picture of many bodies shows are left."""
 
