@@ -357,10 +357,8 @@ def set_edge_sums(sums, radius, vertices, out, edges, first, last):
     largest = -BARRED
     for k in range(first, last + 1):
         k, after = k % count, (k + 1) % count
-        edges[k] = edge_sum(
-            sums, radius, point(vertices, k), point(out, k), point(vertices, after),
-            point(out, after),
-        )  # fmt: skip
+        a, b = point(vertices, k), point(vertices, after)
+        edges[k] = edge_sum(sums, radius, a, point(out, k), b, point(out, after))
         largest = max(largest, edges[k])
     return largest
 

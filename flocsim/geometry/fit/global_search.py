@@ -81,7 +81,7 @@ def edge_costs(sums, radius, points, out, costs):
     inside = np.empty((size, choices), np.bool_)
     for k in range(size):
         for i in range(choices):
-            inside[k, i] = leaves_room(shape, (points[k, i, 0], points[k, i, 1]), radius + 1.0)
+            inside[k, i] = leaves_room(shape, point(points[k], i), radius + 1.0)
     for k in range(size):
         for ahead in range(costs.shape[1]):
             to = (k + ahead + 1) % size
@@ -89,10 +89,8 @@ def edge_costs(sums, radius, points, out, costs):
                 for j in range(choices):
                     cost = BARRED
                     if inside[k, i] and inside[to, j]:
-                        cost = edge_sum(
-                            sums, radius, (points[k, i, 0], points[k, i, 1]), point(out, k),
-                            (points[to, j, 0], points[to, j, 1]), point(out, to),
-                        )  # fmt: skip
+                        a, b = point(points[k], i), point(points[to], j)
+                        cost = edge_sum(sums, radius, a, point(out, k), b, point(out, to))
                     costs[k, ahead, i, j] = cost
 
 
@@ -295,10 +293,9 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
             continue
         added += edge_sum(sums, radius, new, outward, two, point(out, stop)) - edges[edge]
         if jump:
-            added += edge_sum(
-                sums, radius, point(vertices, before), point(out, before), point(vertices, after),
-                point(out, after),
-            ) - edges[before]  # fmt: skip
+            a, b = point(vertices, before), point(vertices, after)
+            added += edge_sum(sums, radius, a, point(out, before), b, point(out, after))
+            added -= edges[before]
         added -= edges[k]
         # Kept with the probability exp(−added/heat).
         if added > heat * draws[move, 3]:

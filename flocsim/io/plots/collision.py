@@ -23,6 +23,9 @@ RING: dict[str, Any] = {
 }  # fmt: skip
 """Of a contact point."""
 
+PATH: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (3, 1.5))}
+"""Of the way of a body's centre."""
+
 GRID = 24
 """Points along a side at which a place for a name is looked for."""
 
@@ -128,10 +131,8 @@ def strip_keys(names):
         for number, name in shown
     ]  # fmt: skip
     seen = f", seen from {names[0]}" if len(names) > 1 else ""
-    keys.append(Line2D([], [], color="0.4", linewidth=0.8, linestyle=(0, (3, 1.5)),
-                       label=f"path of a body's centre, whole run{seen}"))  # fmt: skip
-    keys.append(Line2D([], [], **RING, label="contact"))
-    return keys
+    way = Line2D([], [], color="0.4", label=f"path of a body's centre, whole run{seen}", **PATH)
+    return [*keys, way, Line2D([], [], **RING, label="contact")]
 
 
 @contextlib.contextmanager
@@ -184,8 +185,8 @@ def draw_forces(
         if (largest := largest_of(curves)) > 0.0:
             axes.set_yscale("log")
             axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="pushes —   pulls - -",
-                    alignment="left")  # fmt: skip
+        words = "pushes —   pulls - -"
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title=words, alignment="left")
     return axes.figure
 
 
@@ -308,7 +309,7 @@ def draw_frame(axes, paths, frame, contacts):
 
     for number, path in enumerate(map(np.asarray, paths)):
         colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
-        axes.plot(path[:, 0], path[:, 1], color=colour, linewidth=0.8, linestyle=(0, (3, 1.5)))
+        axes.plot(path[:, 0], path[:, 1], color=colour, **PATH)
     for number, body in enumerate(frame):
         colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
         look = {"facecolor": (colour, 0.3), "edgecolor": colour, "lw": 0.9}

@@ -90,8 +90,8 @@ def sizes(entries: Sequence[ShapeEntry]) -> Figure:
             top = max(top, bars.max())
             marks = zip(diameters_at(found, by_volume), SHARES, (":", "--", "-."), strict=True)
             for value, share, dashes in marks:
-                axes.axvline(value, ymax=BELOW_LEGEND, color="0.25", linestyle=dashes,
-                             label=f"D{100 * share:.0f} = {value:.3g} µm")  # fmt: skip
+                label = f"D{100 * share:.0f} = {value:.3g} µm"
+                axes.axvline(value, ymax=BELOW_LEGEND, color="0.25", linestyle=dashes, label=label)
             axes.set(title=f"by {word}", xlabel="diameter $2r_\\mathrm{eq}$ [µm]")
             axes.set_xlim(left=0.0)
             axes.legend(loc="upper left")
@@ -110,8 +110,8 @@ def shape(entries: Sequence[ShapeEntry]) -> Figure:
         for axes, (name, label) in zip(panels, MEASURES.items(), strict=False):
             values = np.array([getattr(each, name) for each in found])
             axes.hist(values, bins=bins_of(values, values.min()), **BARS)
-            axes.axvline(np.median(values), color="0.25", linestyle="--",
-                         label=f"median {np.median(values):.3g}")  # fmt: skip
+            middle = np.median(values)
+            axes.axvline(middle, color="0.25", linestyle="--", label=f"median {middle:.3g}")
             room = 1.2 * axes.get_ylim()[1]  # for the legend above the bars
             axes.set(xlabel=label, ylabel="number of flocs", ylim=(0.0, room))
             axes.yaxis.get_major_locator().set_params(integer=True)
