@@ -80,12 +80,10 @@ def ring_pieces(ring, radius, number):
         turn = np.maximum(bends, 0.0)
         at_start, at_end = trim_lengths(bends, side_lengths, radius)
     each, sides = len(ring), len(side_lengths)
-    return (
-        ring, first, turn, np.full(each, radius), np.full(each, radius**2), np.full(each, number),
-        starts, units, lengths, np.full(len(lengths), radius),
-        side_starts, side_units, side_lengths, at_start, at_end, np.full(sides, radius),
-        np.full(sides, number),
-    )  # fmt: skip
+    points = ring, first, turn, np.full(each, radius), np.full(each, radius**2)
+    edges = starts, units, lengths, np.full(len(lengths), radius)
+    offsets = side_starts, side_units, side_lengths, at_start, at_end, np.full(sides, radius)
+    return *points, np.full(each, number), *edges, *offsets, np.full(sides, number)
 
 
 def lies_on_edge(along, lengths):

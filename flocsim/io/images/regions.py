@@ -115,13 +115,12 @@ def sorted_out(outlines, shape, filters, numbers=None):
     found = []
     for place, each in enumerate(outlines):
         mask, box = each.mask, each.box
-        radius = float(np.sqrt(mask.sum() / np.pi))
-        found.append(Region(
-            0 if numbers is None else numbers[place], centroid_of(mask, box),
-            (box[0].start, box[1].start, box[0].stop, box[1].stop), int(mask.sum()), radius,
-            placed(mask, box, beyond(box, 1)), each.softness, each.level, each.base, each.parted,
-            reason=reason_to_reject(box, shape, radius, each.softness, filters),
-        ))  # fmt: skip
+        radius, label = float(np.sqrt(mask.sum() / np.pi)), 0 if numbers is None else numbers[place]
+        bbox = box[0].start, box[1].start, box[0].stop, box[1].stop
+        measured = label, centroid_of(mask, box), bbox, int(mask.sum()), radius
+        cut = placed(mask, box, beyond(box, 1)), each.softness, each.level, each.base, each.parted
+        reason = reason_to_reject(box, shape, radius, each.softness, filters)
+        found.append(Region(*measured, *cut, reason=reason))
     kept, left = ([each for each in found if bool(each.reason) == out] for out in (False, True))
     if numbers is None:
         counted = [attrs.evolve(each, label=n) for n, each in enumerate([*kept, *left], start=1)]

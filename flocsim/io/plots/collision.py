@@ -94,11 +94,11 @@ def name_bodies(axes, frame, names):
     """Each body's name where it is widest, clear of the path drawn there."""
     from matplotlib.patheffects import withStroke
 
-    halo = [withStroke(linewidth=3.0, foreground="white")]
+    look = {"ha": "center", "va": "center", "fontsize": 9, "weight": "bold", "zorder": 7}
+    look["path_effects"] = [withStroke(linewidth=3.0, foreground="white")]
     for number, (body, name) in enumerate(zip(frame, names, strict=True)):
         colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
-        axes.text(*deepest_inside(max(body, key=len)), name, ha="center", va="center", fontsize=9,
-                  color=colour, weight="bold", zorder=7, path_effects=halo)  # fmt: skip
+        axes.text(*deepest_inside(max(body, key=len)), name, color=colour, **look)
 
 
 def deepest_inside(polygon):
@@ -124,12 +124,10 @@ def strip_keys(names):
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    shown = list(enumerate(names))[: len(style.BODY_COLOURS)]
     keys = [
-        Patch(facecolor=(style.BODY_COLOURS[number], 0.3), edgecolor=style.BODY_COLOURS[number],
-              label=f"body {name}")
-        for number, name in shown
-    ]  # fmt: skip
+        Patch(facecolor=(colour, 0.3), edgecolor=colour, label=f"body {name}")
+        for colour, name in zip(style.BODY_COLOURS, names, strict=False)
+    ]
     seen = f", seen from {names[0]}" if len(names) > 1 else ""
     way = Line2D([], [], color="0.4", label=f"path of a body's centre, whole run{seen}", **PATH)
     return [*keys, way, Line2D([], [], **RING, label="contact")]

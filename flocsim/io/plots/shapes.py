@@ -165,10 +165,10 @@ def draw_errors(axes, entries):
             continue
         errors = np.array([[e.fits[n].relative_error for n in counts] for e in members])
         mean, spread = errors.mean(axis=0), errors.std(axis=0)
-        below = np.minimum(spread, mean)
+        reach = [np.minimum(spread, mean), spread]
         label = rf"$r_\mathrm{{eq}}$ {sign} {CLASS_LIMIT:g} px ({len(members)})"
-        axes.errorbar(places + shift, mean, [below, spread], color=colour, marker=marker,
-                      elinewidth=0.7, capsize=2, label=label)  # fmt: skip
+        look = {"color": colour, "marker": marker, "label": label}
+        axes.errorbar(places + shift, mean, reach, elinewidth=0.7, capsize=2, **look)
         if 1 in entries[0].fits:
             spheres = np.mean([e.fits[1].relative_error for e in members])
             axes.axhline(spheres, color=colour, linestyle="--", linewidth=0.8)
@@ -309,8 +309,9 @@ class Labels:
         boxes = [self.inside(x, y, width, height) for x, y in corners]
         box = next(filter(self.is_free, boxes), boxes[0])
         self.taken.append(box)
-        self.axes.text(box[0], box[1], text, color=colour, fontsize=size, va="top", ha="left",
-                       path_effects=[withStroke(linewidth=0.9, foreground="black")])  # fmt: skip
+        around = [withStroke(linewidth=0.9, foreground="black")]
+        look = {"va": "top", "ha": "left", "path_effects": around}
+        self.axes.text(box[0], box[1], text, color=colour, fontsize=size, **look)
 
     def inside(self, x, y, width, height):
         x = min(max(x, 0.0), max(self.shape[1] - 1.0 - width, 0.0))
