@@ -105,13 +105,13 @@ def run_list(args: argparse.Namespace) -> int:
         rows = [[*heads, *(f"RE% N={count}" for count in counts)]]
         for each in entries:
             found = measures_in(each)
-            rows.append([
-                each.floc_id, f"{MICRO * each.measured_radius:.4g}",
-                f"{MICRO * each.pixel_size:.4g}", f"{each.spheroradius:g}",
-                *(f"{factor * getattr(found, name):{form}}"
-                  for name, factor, form in MEASURES.values()),
-                *(f"{each.fits[count].relative_error:.2f}" for count in counts),
-            ])  # fmt: skip
+            sizes = (f"{MICRO * size:.4g}" for size in (each.measured_radius, each.pixel_size))
+            shape = [
+                f"{factor * getattr(found, name):{form}}"
+                for name, factor, form in MEASURES.values()
+            ]
+            errors = [f"{each.fits[count].relative_error:.2f}" for count in counts]
+            rows.append([each.floc_id, *sizes, f"{each.spheroradius:g}", *shape, *errors])
         print("\n".join([f"{library}: {plural(len(entries), 'floc')}", *aligned(rows, left=1)]))
         if entries:
             print("\n".join(population_lines(entries)))

@@ -117,11 +117,10 @@ class Study(StudyKind):
             self.pairings, sphere_pairs(config, self.flocs), strict=True
         ):
             pieces = pair.system.pieces
-            facts[f"numbers.{name}"] = np.array([
-                *pieces.parameters, pieces.surface_reach, *pieces.smoothness, pieces.events,
-                *(pieces.outlines if pieces.outlines[0] > 0.0 else ()),
-                *(pieces.layer if pieces.layer[2] > 0.0 else ()),
-            ], float)  # fmt: skip
+            own = [*pieces.parameters, pieces.surface_reach, *pieces.smoothness, pieces.events]
+            own += pieces.outlines if pieces.outlines[0] > 0.0 else ()
+            own += pieces.layer if pieces.layer[2] > 0.0 else ()
+            facts[f"numbers.{name}"] = np.array(own, float)
             # A force of the user's own may compute what the zone follows from.
             facts[f"types.{name}"] = [*pairing.radii, pair.zone_distance]
             if config.shapes.own is not None and self.flocs:
