@@ -127,11 +127,12 @@ def run(args: Namespace) -> int:
             found = bench.compare(task, each)
             verdict, why = verdict_on(found, each)
             verdicts[verdict] += 1
-            print(table_line(COLUMNS, [
+            cells = [
                 config.scene.names[condition], n, type(each).__name__, setting_of(each),
                 f"{task[0][2]:.3g}", task[1], found.steps or "-", number(1e3 * found.cpu, ".2f"),
                 number(found.error), number(found.stated), f"  {verdict}{': ' * bool(why)}{why}",
-            ]))  # fmt: skip
+            ]  # fmt: skip
+            print(table_line(COLUMNS, cells))
     print(
         f"\n{verdicts[RIGHT]} {RIGHT} (within the tolerance), {verdicts[STATED]} {STATED}, "
         f"{verdicts[WRONG]} {WRONG}"

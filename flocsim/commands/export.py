@@ -129,13 +129,10 @@ def export_matrices(args: argparse.Namespace) -> int:
     for mechanism, count in itertools.product(kernel.mechanisms, kernel.vertices.tolist()):
         ending = [args.model, args.curvilinear or ""] if multiplies else []
         parts = [start.name, mechanism, f"N{count}", args.what, *ending]
+        path = start.with_name(f"{'-'.join(filter(None, parts))}.csv")
+        asked = mechanism, count, args.what, args.model, args.curvilinear
         try:
-            texts[start.with_name(f"{'-'.join(filter(None, parts))}.csv")] = (
-                kernel_tables.kernel_matrix(
-                    kernel, mechanism, count, args.what, args.model, args.curvilinear,
-                    factors.get(mechanism),
-                )
-            )  # fmt: skip
+            texts[path] = kernel_tables.kernel_matrix(kernel, *asked, factors.get(mechanism))
         except UsageError as error:
             # As for a mechanism of which a model, or a factor, knows nothing.
             without.append(str(error))

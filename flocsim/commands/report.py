@@ -26,7 +26,6 @@ from flocsim.io.files import write_file
 from flocsim.io.outputs import check_outputs
 from flocsim.io.plots.collision import (
     CONTACT_COLOUR,
-    MICRO,
     Frames,
     draw_distance,
     rounded_length,
@@ -37,6 +36,7 @@ from flocsim.io.plots.style import (
     BODY_COLOURS,
     CLASS_WORDS,
     METADATA,
+    MICRO,
     Figure,
     add_foot,
     house_style,

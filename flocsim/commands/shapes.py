@@ -22,7 +22,7 @@ from flocsim.io.fit_report import format_errors, measures_in, plural, population
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import check_outputs
 from flocsim.io.plots.shapes import POPULATION_FIGURES
-from flocsim.io.plots.style import Figure
+from flocsim.io.plots.style import MICRO, Figure
 from flocsim.io.shape_library import (
     ShapeEntry,
     labelled_flocs,
@@ -31,8 +31,6 @@ from flocsim.io.shape_library import (
     write_library,
 )
 from flocsim.io.terminal import aligned
-
-MICRO = 1e6
 
 MEASURES = {
     "perim um": ("perimeter", MICRO, ".4g"),
@@ -107,13 +105,13 @@ def run_list(args: argparse.Namespace) -> int:
         rows = [[*heads, *(f"RE% N={count}" for count in counts)]]
         for each in entries:
             found = measures_in(each)
-            rows.append([
-                each.floc_id, f"{MICRO * each.measured_radius:.4g}",
-                f"{MICRO * each.pixel_size:.4g}", f"{each.spheroradius:g}",
-                *(f"{factor * getattr(found, name):{form}}"
-                  for name, factor, form in MEASURES.values()),
-                *(f"{each.fits[count].relative_error:.2f}" for count in counts),
-            ])  # fmt: skip
+            sizes = (f"{MICRO * size:.4g}" for size in (each.measured_radius, each.pixel_size))
+            shape = [
+                f"{factor * getattr(found, name):{form}}"
+                for name, factor, form in MEASURES.values()
+            ]
+            errors = [f"{each.fits[count].relative_error:.2f}" for count in counts]
+            rows.append([each.floc_id, *sizes, f"{each.spheroradius:g}", *shape, *errors])
         print("\n".join([f"{library}: {plural(len(entries), 'floc')}", *aligned(rows, left=1)]))
         if entries:
             print("\n".join(population_lines(entries)))

@@ -102,13 +102,13 @@ def rung(
 
     name, error = type(method).__name__, quantile("error")
     cpu = 1e3 * float(np.mean([each.cpu for each in found]))
-    line = table_line(COLUMNS, [
+    cells = [
         name, setting_of(method), flips, f"{100.0 * flips / len(found):.2f}",
         f"[{low:.2g}, {high:.2g}]", number(error), number(quantile("error", 0.9)),
         number(quantile("stated")), f"{quantile('steps'):.0f}",
         number(cpu, ".2f"), sum(bool(each.why) for each in found),
-    ])  # fmt: skip
-    return Rung(name, line, (cpu, error))
+    ]  # fmt: skip
+    return Rung(name, table_line(COLUMNS, cells), (cpu, error))
 
 
 def run(args: Namespace) -> int:

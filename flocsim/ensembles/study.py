@@ -117,11 +117,10 @@ class Study(StudyKind):
             self.pairings, sphere_pairs(config, self.flocs), strict=True
         ):
             pieces = pair.system.pieces
-            facts[f"numbers.{name}"] = np.array([
-                *pieces.parameters, pieces.surface_reach, *pieces.smoothness, pieces.events,
-                *(pieces.outlines if pieces.outlines[0] > 0.0 else ()),
-                *(pieces.layer if pieces.layer[2] > 0.0 else ()),
-            ], float)  # fmt: skip
+            own = [*pieces.parameters, pieces.surface_reach, *pieces.smoothness, pieces.events]
+            own += pieces.outlines if pieces.outlines[0] > 0.0 else ()
+            own += pieces.layer if pieces.layer[2] > 0.0 else ()
+            facts[f"numbers.{name}"] = np.array(own, float)
             # A force of the user's own may compute what the zone follows from.
             facts[f"types.{name}"] = [*pairing.radii, pair.zone_distance]
             if config.shapes.own is not None and self.flocs:
@@ -164,19 +163,13 @@ class Study(StudyKind):
     @property
     def point_scrambles(self) -> int:
         """Of how many scrambles of Sobol's sequence the replicates are points; 0 for none."""
-        return self.scrambles
+        return self.config.scrambles
 
     def numbers(self, replicate: int) -> np.ndarray:
         """The random numbers of a replicate in [0, 1), see draws, or a point of Sobol's."""
         if self.point_scrambles:
             return point(self.config.seed, self.point_scrambles, replicate)
         return draws(self.config.seed, replicate)
-
-    @property
-    def scrambles(self) -> int:
-        """Of how many scrambles the replicates of a condition are points; 0 for independent ones,
-        and where rates follow from the points."""
-        return self.config.scrambles
 
     def share_of(
         self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray

@@ -261,9 +261,8 @@ def columns_at(pair: SpherePair, gap: np.ndarray) -> np.ndarray:
     )  # fmt: skip
     (k_n, load_n, l_n, pull_n), (k_t, load_t, l_t, pull_t) = n, t
     sliding = np.stack([l_t[:, 0, 0], l_t[:, 1, 0], l_t[:, 1, 1]], axis=1)
-    return np.concatenate([
-        k_n[:, 0], k_t[:, 0], k_t[:, 1], load_n, load_t, l_n[:, 0], sliding, pull_n, pull_t,
-    ], axis=1)  # fmt: skip
+    common = k_n[:, 0], k_t[:, 0], k_t[:, 1], load_n, load_t
+    return np.concatenate([*common, l_n[:, 0], sliding, pull_n, pull_t], axis=1)
 
 
 def split(

@@ -397,7 +397,7 @@ def mean_velocity(velocities, i):
 
 
 def find_shares(
-    c, cells, starts, grid, places, radii, own, shares, residual, direction, velocities, sums
+    c, cells, starts, grid, places, radii, own, shares, residual, search, velocities, sums
 ):
     """Write the shares of a force with which all bodies of cluster c move alike.
 
@@ -408,7 +408,7 @@ def find_shares(
     for i in range(first, last):
         shares[i] = radii[i]
     cluster_velocities(c, cells, starts, grid, places, radii, own, shares, velocities, sums)
-    # Initial shares, scaled to a mean velocity of 1; ``direction``: the search direction.
+    # Initial shares, scaled to a mean velocity of 1; ``search``: the direction searched along.
     speed = total = residual_norm = scale = 0.0
     for i in range(first, last):
         speed += shares[i] * mean_velocity(velocities, i)
@@ -417,26 +417,24 @@ def find_shares(
     for i in range(first, last):
         shares[i] *= total / speed
         residual[i] = 1.0 - mean_velocity(velocities, i) * total / speed
-        direction[i] = residual[i] / mean_velocity(own, i)
-        residual_norm += residual[i] * direction[i]
+        search[i] = residual[i] / mean_velocity(own, i)
+        residual_norm += residual[i] * search[i]
     for _ in range(MOST_ITERATIONS):
         if residual_norm <= SHARE_ERROR * SHARE_ERROR * scale:
             break
-        cluster_velocities(c, cells, starts, grid, places, radii, own, direction, velocities, sums)
-        # One iteration of conjugate gradients: step along ``direction``, new residual, conjugate
+        cluster_velocities(c, cells, starts, grid, places, radii, own, search, velocities, sums)
+        # One iteration of conjugate gradients: step along ``search``, new residual, conjugate
         # direction.
         curvature = 0.0
         for i in range(first, last):
-            curvature += direction[i] * mean_velocity(velocities, i)
+            curvature += search[i] * mean_velocity(velocities, i)
         before, residual_norm = residual_norm, 0.0
         for i in range(first, last):
-            shares[i] += before / curvature * direction[i]
+            shares[i] += before / curvature * search[i]
             residual[i] -= before / curvature * mean_velocity(velocities, i)
             residual_norm += residual[i] * residual[i] / mean_velocity(own, i)
         for i in range(first, last):
-            direction[i] = (
-                residual[i] / mean_velocity(own, i) + residual_norm / before * direction[i]
-            )
+            search[i] = residual[i] / mean_velocity(own, i) + residual_norm / before * search[i]
     total = 0.0
     for i in range(first, last):
         total += shares[i]
@@ -445,31 +443,20 @@ def find_shares(
 
 
 def cluster_mobilities(
-    cells, starts, grid, places, radii, own, shares, residual, direction, velocities, sums, found
+    cells, starts, grid, places, radii, own, shares, residual, search, velocities, sums, found
 ):
     """Write to ``found`` (c, 3) the mobilities (xx, xy, yy) [1/m] of clusters, over the viscosity.
 
     Cells of cluster c are ``cells[c]`` to ``cells[c + 1]``, bodies of cell k ``starts[k]`` to
     ``starts[k + 1]``; ``grid`` (k, 4): column and row of a cell, and the mean position of its
     bodies [m]. Of the bodies: ``places`` (n, 2) [m], unwrapped across periodic boundaries,
-    ``radii`` [m] of the spheres that represent them, ``own`` (3, n) [1/m], their mobilities alone.
-    Scratch: ``shares``, ``residual`` and ``direction`` (n,), ``velocities`` (3, n), and ``sums``
+    ``radii`` [m] of the spheres that represent them, ``own`` (3, n) [1/m], their mobilities
+    alone. Scratch: ``shares``, ``residual`` and ``search`` (n,), ``velocities`` (3, n), ``sums``
     (4, k).
     """
     for c in range(cells.shape[0] - 1):
         find_shares(
-            c,
-            cells,
-            starts,
-            grid,
-            places,
-            radii,
-            own,
-            shares,
-            residual,
-            direction,
-            velocities,
-            sums,
+            c, cells, starts, grid, places, radii, own, shares, residual, search, velocities, sums
         )
         cluster_velocities(c, cells, starts, grid, places, radii, own, shares, velocities, sums)
         for i in range(starts[cells[c]], starts[cells[c + 1]]):

@@ -11,6 +11,7 @@ arXiv:1802.08226.
 """
 
 from functools import lru_cache
+from typing import Any
 
 import attrs
 import numpy as np
@@ -103,14 +104,15 @@ def couplings(shares: tuple[float, float], order: int, terms: int) -> list[dict]
         "q_of_p": (-3 / (2 * n * s * (n + 1)), s, n),
     }
     used = n + s <= terms + 2
-    found = []
-    for own, other in (shares, shares[::-1]):
-        found.append({
-            name: np.where(used, factor * np.exp(np.where(
-                used, binomial + of_other * np.log(other) + of_own * np.log(own), 0.0)), 0.0)
-            for name, (factor, of_other, of_own) in factors.items()
-        })  # fmt: skip
-    return found
+
+    def matrix(factor: Any, of_other: Any, of_own: Any, own: float, other: float) -> np.ndarray:
+        logs = np.where(used, binomial + of_other * np.log(other) + of_own * np.log(own), 0.0)
+        return np.where(used, factor * np.exp(logs), 0.0)
+
+    return [
+        {name: matrix(*each, own, other) for name, each in factors.items()}
+        for own, other in (shares, shares[::-1])
+    ]
 
 
 def multipoles(ratio: float, order: int, spinning: bool, terms: int) -> list[np.ndarray]:

@@ -110,10 +110,8 @@ def summary_text(pictures: Sequence[Any]) -> str:
         for region in (*picture.found.regions, *picture.found.rejected):
             fits = None if region.reason else picture.fits.get(region.label)
             measures = None if region.reason else picture.measures[region.label]
-            radius, band = (
-                region.equivalent_radius,
-                region.radius_band if region.band else (NAN, NAN),
-            )
+            radius = region.equivalent_radius
+            band = region.radius_band if region.band else (NAN, NAN)
             table.writerow([
                 picture.name, region.label, region.reason,
                 *(f"{each:.2f}" for each in region.centroid),

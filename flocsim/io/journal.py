@@ -147,15 +147,13 @@ def read_journal(path: Path) -> Iterator[JournalReader]:
     """Open a journal for reading, also while a run writes it; FileError if that is impossible."""
     # Without a log nothing is locked, and none is made: the folder may be read-only.
     options = "mode=ro" if beside(path, WAL_SUFFIX).exists() else "immutable=1"
-    try:
-        db = connect(f"{path.absolute().as_uri()}?{options}")
-    except (OSError, sqlite3.Error) as error:
-        raise FileError(f"{path} could not be read: {error}") from error
-    with contextlib.closing(db):
+    with contextlib.ExitStack() as opened:
         try:
+            db = connect(f"{path.absolute().as_uri()}?{options}")
+            opened.enter_context(contextlib.closing(db))
             db.execute("BEGIN")  # all that follows sees one state of a journal that grows
             is_begun = has_tables(db)
-        except sqlite3.Error as error:
+        except (OSError, sqlite3.Error) as error:
             raise FileError(f"{path} could not be read: {error}") from error
         if not is_begun:
             raise FileError(f"{path} has only just begun: try again")

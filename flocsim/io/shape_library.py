@@ -54,44 +54,49 @@ MOST_PIXELS = 1e12
 LEAST = 5e-324
 """The least number above 0."""
 
-FLOC_COLUMNS = declared(
-    {
-        "id": ("text", "", "picture and region"),
-        "image": ("text", "", "file name of the picture"),
-        "pixel_size": ("f8", "m", "length of a pixel's side"),
-        "centroid": ("f8", "px", "centroid in the picture, x right and y down"),
-        "area": ("i8", "px", "pixels of the mask"),
-        "equivalent_radius": ("f8", "px", "radius of the circle of equal area"),
-        "spheroradius": ("f8", "px", "spheroradius asked for"),
-    },
-    ("floc",), low=LEAST, high=MOST_PIXELS,
-)  # fmt: skip
+OF_FLOC = {
+    "id": ("text", "", "picture and region"),
+    "image": ("text", "", "file name of the picture"),
+    "pixel_size": ("f8", "m", "length of a pixel's side"),
+    "centroid": ("f8", "px", "centroid in the picture, x right and y down"),
+    "area": ("i8", "px", "pixels of the mask"),
+    "equivalent_radius": ("f8", "px", "radius of the circle of equal area"),
+    "spheroradius": ("f8", "px", "spheroradius asked for"),
+}
+FLOC_COLUMNS = declared(OF_FLOC, ("floc",), low=LEAST, high=MOST_PIXELS)
 FLOC_COLUMNS["centroid"] = attrs.evolve(
     FLOC_COLUMNS["centroid"], axes=("floc", 2), low=-MOST_PIXELS
 )
 
-MEASURE_COLUMNS = declared(
-    {
-        "perimeter": ("f8", "px", "length of the outline"),
-        "aspect_ratio": ("f8", "1", "long over short axis of the ellipse of equal moments"),
-        "circularity": ("f8", "1", "4 pi area / perimeter^2"),
-        "solidity": ("f8", "1", "area over that of the convex hull"),
-        "feret_max": ("f8", "px", "largest distance of two parallel tangents"),
-        "feret_min": ("f8", "px", "smallest distance of two parallel tangents"),
-    },
-    ("floc",),
-)
+OF_MASK = {
+    "perimeter": ("f8", "px", "length of the outline"),
+    "aspect_ratio": ("f8", "1", "long over short axis of the ellipse of equal moments"),
+    "circularity": ("f8", "1", "4 pi area / perimeter^2"),
+    "solidity": ("f8", "1", "area over that of the convex hull"),
+    "feret_max": ("f8", "px", "largest distance of two parallel tangents"),
+    "feret_min": ("f8", "px", "smallest distance of two parallel tangents"),
+}
+MEASURE_COLUMNS = declared(OF_MASK, ("floc",))
 """The measures of the masks."""
 
-POPULATION_COLUMNS = declared(
-    {
-        "weight": ("f8", "1", "number of flocs that it represents, of which filters kept only it"),
-        "radius_low": ("f8", "px", "equivalent radius as it would have been cut closer"),
-        "radius_high": ("f8", "px", "equivalent radius as it would have been cut wider"),
-    },
-    ("floc",), low=LEAST, high=MOST_PIXELS,
-)  # fmt: skip
+OF_POPULATION = {
+    "weight": ("f8", "1", "number of flocs that it represents, of which filters kept only it"),
+    "radius_low": ("f8", "px", "equivalent radius as it would have been cut closer"),
+    "radius_high": ("f8", "px", "equivalent radius as it would have been cut wider"),
+}
+POPULATION_COLUMNS = declared(OF_POPULATION, ("floc",), low=LEAST, high=MOST_PIXELS)
 """What the picture leaves open."""
+
+VERTICES = {"vertices": ("f8", "m", "vertices around the floc's centroid, x right and y up")}
+NUMBERS = {
+    "part": ("i4", "", "part of the floc that a vertex belongs to"),
+    "ring": ("i4", "", "ring of the part: 0 its outline, from 1 its holes"),
+}
+RADII = {"point_radius": ("f8", "m", "spheroradius of the part")}
+ERRORS = {
+    "relative_error": ("f8", "percent", "pixels that differ, in percent of the mask's pixels")
+}
+"""Columns of fits, of each vertex and of the whole."""
 
 ATTRIBUTES = {
     "id": "floc_id", "vertices": "table.place", "part": "table.part", "ring": "table.ring",
@@ -109,17 +114,9 @@ def groups_of(kinds: Iterable[str], counts: Sequence[int]) -> dict[str, Group]:
               "population": Group(POPULATION_COLUMNS, {})}  # fmt: skip
     for count in counts:
         points = ("floc", count)
-        columns = {
-            "vertices": Dataset("f8", (*points, 2), "m", "vertices around the floc's centroid, x "
-                                "right and y up", low=-LARGEST, high=LARGEST),
-            "part": Dataset("i4", points, "", "part of the floc that a vertex belongs to", low=0),
-            "ring": Dataset("i4", points, "", "ring of the part: 0 its outline, from 1 its holes",
-                            low=0),
-            "point_radius": Dataset("f8", points, "m", "spheroradius of the part", low=0.0,
-                                    high=LARGEST),
-            "relative_error": Dataset("f8", ("floc",), "percent", "pixels that differ, in percent "
-                                      "of the mask's pixels", low=0.0),
-        }  # fmt: skip
+        columns = declared(VERTICES, (*points, 2), low=-LARGEST, high=LARGEST)
+        columns |= declared(NUMBERS, points, low=0) | declared(RADII, points, low=0.0, high=LARGEST)
+        columns |= declared(ERRORS, ("floc",), low=0.0)
         groups |= {f"{kind}/{count}": Group(columns, {}) for kind in kinds}
     return groups
 

@@ -143,12 +143,11 @@ def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touche
     n = swarm.bodies.shape[0]
     set_discs(swarm, span, reach)
     total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
+    known = total <= pairs.shape[0]
+    if known and widen_landing(swarm, span, width, height, pairs, total, reach):
+        total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
     if total > pairs.shape[0]:
         return total
-    if widen_landing(swarm, span, width, height, pairs, total, reach):
-        total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
-        if total > pairs.shape[0]:
-            return total
     for body in range(n):
         labels[body] = body
     for pair in range(total):
@@ -173,8 +172,11 @@ def set_boxes(swarm, reach):
         set_disc(swarm, body, 0.5 * (left + right), 0.5 * (low + high), 0.0, 0.0, wide)
 
 
-def gap_along(low, high, other_low, other_high, period):
-    """How far two stretches of an axis are apart [m], by their nearest images."""
+def gap_along(ways, a, b, stretch, low_end, high_end, period):
+    """How far two bodies' stretches of an axis are apart [m], by their nearest images; the ends of
+    each are these columns of ``ways``."""
+    low, high = ways[a, stretch, low_end], ways[a, stretch, high_end]
+    other_low, other_high = ways[b, stretch, low_end], ways[b, stretch, high_end]
     between = abs(nearest_displacement(0.5 * (low + high - other_low - other_high), period))
     return max(between - 0.5 * (high - low + other_high - other_low), 0.0)
 
@@ -184,14 +186,8 @@ def have_met(swarm, a, b, reach, width, height):
     ways = swarm.ways
     near = swarm.bodies[a].bounding_radius + swarm.bodies[b].bounding_radius + reach
     for stretch in range(sw.STRETCHES):
-        x = gap_along(
-            ways[a, stretch, sw.LEFT], ways[a, stretch, sw.RIGHT],
-            ways[b, stretch, sw.LEFT], ways[b, stretch, sw.RIGHT], width,
-        )  # fmt: skip
-        y = gap_along(
-            ways[a, stretch, sw.LOW], ways[a, stretch, sw.HIGH],
-            ways[b, stretch, sw.LOW], ways[b, stretch, sw.HIGH], height,
-        )  # fmt: skip
+        x = gap_along(ways, a, b, stretch, sw.LEFT, sw.RIGHT, width)
+        y = gap_along(ways, a, b, stretch, sw.LOW, sw.HIGH, height)
         if x * x + y * y < near * near:
             return True
     return False

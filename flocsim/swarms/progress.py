@@ -307,8 +307,7 @@ class Progress:
             return
         for members in self.leaving.leaving(self.swarm, self.free):
             if self.leaving.rule == REMOVE:
-                gone = np.zeros(len(self.gone), bool)
-                gone[members] = True
+                gone = np.isin(np.arange(len(self.gone)), members)
                 self.forget(gone)
                 self.swarm = self.leaving.removed(self.swarm, gone)
             else:

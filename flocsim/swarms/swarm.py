@@ -270,10 +270,9 @@ class Swarm:
             if status != Status.FINISHED:
                 break
         t, motion, error = (np.array(column) for column in zip(*seen, strict=True))
-        return SwarmTrajectory(
-            t, motion[:, :, :3], motion[:, :, 3:], error, status, progress.failed, progress.effort,
-            time.perf_counter() - began, self.bodies, self.box, self,
-        )  # fmt: skip
+        places, rates = motion[:, :, :3], motion[:, :, 3:]
+        ended = status, progress.failed, progress.effort, time.perf_counter() - began
+        return SwarmTrajectory(t, places, rates, error, *ended, self.bodies, self.box, self)
 
 
 FLOW_ADVICE = (

@@ -112,12 +112,10 @@ class Instant:
             force = (0.0, 0.0)
             if has(self.scene, CONTACT_FORCE):
                 force = contact_force(self.scene, contact_view(self.scene, work, NOW, row))
-            found.append(Contact(
-                (a, b), (float(x + dx), float(y + dy)),
-                (float(geometry.normal_x), float(geometry.normal_y)),
-                float(-geometry.gap), float(work.slip[NOW, row]),
-                (float(force[0]), float(force[1])),
-            ))  # fmt: skip
+            normal = float(geometry.normal_x), float(geometry.normal_y)
+            depth, slip = float(-geometry.gap), float(work.slip[NOW, row])
+            push = float(force[0]), float(force[1])
+            found.append(Contact((a, b), (float(x + dx), float(y + dy)), normal, depth, slip, push))
         return found
 
 

@@ -99,12 +99,9 @@ class Trajectory:
         row: dict | None = None, origin: Origin | None = None,
     ) -> "Trajectory":  # fmt: skip
         """What a Run has come to."""
-        times, position, velocity = run.motion()
-        adaptive = np.isfinite(run.clock.tolerance)
-        return cls(
-            times, position, velocity, status, run.steps, run.rejected, run.evaluations,
-            run.error if adaptive else float("nan"), wall_time, amplification, row, origin,
-        )  # fmt: skip
+        counts = run.steps, run.rejected, run.evaluations
+        error = run.error if np.isfinite(run.clock.tolerance) else float("nan")
+        return cls(*run.motion(), status, *counts, error, wall_time, amplification, row, origin)
 
     def known(self) -> Origin:
         """Where this came from; UsageError for one that was read from a file."""

@@ -20,7 +20,7 @@ SOBOL = {"sampling": "sobol", "replicates": 32, "scene": {"types": ("I",), "delt
 
 def test_replicates_are_points_of_sixteen_scrambles_the_same_in_all_conditions(tmp_path):
     study = small_study(tmp_path, SOBOL)
-    assert study.scrambles == 16
+    assert study.point_scrambles == 16
     numbers = np.array([study.numbers(k) for k in range(256)])
     np.testing.assert_array_equal(numbers, points_of(1, 16, 0, 256))
     for scramble in range(16):

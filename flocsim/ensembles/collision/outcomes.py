@@ -173,14 +173,12 @@ def is_away(scene, work, observed, distance, gap):
 
 def left_over(scene, work, observed):
     """Return how far j may still be carried off the drift, or the flow, by its velocity [m]."""
-    ux, uy = (
-        apart(work.velocity, X) - observed[DRIFT_X],
-        apart(work.velocity, Y) - observed[DRIFT_Y],
-    )
+    ux, uy = observed[DRIFT_X], observed[DRIFT_Y]
     if observed[IN_FLOW] != 0.0:
         x, y = apart(work.place, X), apart(work.place, Y)
-        ux = apart(work.velocity, X) - (observed[FLOW_XX] * x + observed[FLOW_XY] * y)
-        uy = apart(work.velocity, Y) - (observed[FLOW_YX] * x + observed[FLOW_YY] * y)
+        ux = observed[FLOW_XX] * x + observed[FLOW_XY] * y
+        uy = observed[FLOW_YX] * x + observed[FLOW_YY] * y
+    ux, uy = apart(work.velocity, X) - ux, apart(work.velocity, Y) - uy
     # Drag uses a velocity u up over u times the relaxation time m µ.
     relaxation = max(
         scene.bodies[BODY_I].mass * observed[MOBILITY_I],
@@ -225,10 +223,8 @@ def can_meet_again(scene, work, observed, time):
     clear += turn_left(scene, work, time, BODY_J, passing)
     contact = scene.bodies[BODY_I].radius + scene.bodies[BODY_J].radius
     turn_c, turn_s, x, y = pose_of(scene, work, BODY_J, BODY_I)
-    c, s = (
-        math.cos(work.place[NOW, BODY_I, ANGLE]),
-        math.sin(work.place[NOW, BODY_I, ANGLE]),
-    )
+    angle = work.place[NOW, BODY_I, ANGLE]
+    c, s = math.cos(angle), math.sin(angle)
     # In the frame of i: sphere tracing of j's outline along the drift.
     ux, uy = c * ux + s * uy, c * uy - s * ux
     for _ in range(MOST_ADVANCES):

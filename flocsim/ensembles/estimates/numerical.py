@@ -60,11 +60,9 @@ def gains_and_losses(before: Events, after: Events) -> tuple[np.ndarray, np.ndar
 
 def of_each_kind(kinds: np.ndarray, flags: Iterable[np.ndarray]) -> np.ndarray:
     """Return whole numbers (…, kind, flag): for how many of each of kinds_of a flag is set."""
-    flags = [*flags]
-    return np.stack(
-        [np.stack([(along(kind, each) & each).sum(axis=-1) for each in flags], axis=-1)
-         for kind in kinds], axis=-2,
-    )  # fmt: skip
+    of_flags = [np.stack([(along(kind, each) & each).sum(axis=-1) for kind in kinds], axis=-1)
+                for each in flags]  # fmt: skip
+    return np.stack(of_flags, axis=-1)
 
 
 def kind_counts(kinds: np.ndarray, again: Codes, third: Codes) -> np.ndarray:

@@ -55,7 +55,7 @@ def results(study: Study, start: Beginning, count: int, run: dict, output: str |
     """Write the results of so many replicates to ``output``, and return all but their rows."""
     reader = summary.Reader(start.store, (*study.shape[:3], count))
     kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
-    sums = summary.sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
+    sums = summary.sums_of(reader.codes, len(study.conditions), 0, count, study.config.scrambles)
     found = summary.results_of(study, count, sums, run, kernel)
 
     def part(first: int, stop: int) -> np.ndarray:
@@ -72,7 +72,7 @@ def facts(study: Study) -> dict[str, Any]:
     given = study.config, study.flocs
     return {
         report.MOST_UNDECIDED: study.config.stop.undecided,
-        report.SCRAMBLES: study.scrambles,
+        report.SCRAMBLES: study.config.scrambles,
         "size_classes": json.dumps(class_facts(study.pairings)),
         "settling": json.dumps(settling_facts(*given)),
         "equivalent_spheres": json.dumps(sphere_facts(*given)),

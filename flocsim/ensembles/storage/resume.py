@@ -155,11 +155,12 @@ def begin(
     refuse_fewer(start, output, study.config.replicates)
     stop = study.config.stop
     ends_early = None if stop.half_width is None else [stop.half_width, list(stop.of), stop.least]
-    store.session = journal.add(SESSION, as_text({
+    about = {
         "kind": study.format, "identity": identity, "layout": layout(study.row), "date": now(),
         "command": shlex.join(sys.argv), "processor": processor(), "rule": ends_early,
         "asked": study.asked(), "source": source_line(study.source),
-    }))  # fmt: skip
+    }  # fmt: skip
+    store.session = journal.add(SESSION, as_text(about))
     start.rules[store.session] = ends_early
     journal.sync()
     return start

@@ -139,11 +139,7 @@ def padded(mask: np.ndarray, count: int, radius: float) -> tuple[np.ndarray, int
 
 def neighbours(vertices, k):
     after = (k + 1) % len(vertices)
-    return (
-        (vertices[k - 1, 0], vertices[k - 1, 1]),
-        (vertices[k, 0], vertices[k, 1]),
-        (vertices[after, 0], vertices[after, 1]),
-    )
+    return point(vertices, k - 1), point(vertices, k), point(vertices, after)
 
 
 def row_reach(ax, ay, bx, by, row, radius):
@@ -182,13 +178,8 @@ def move_vertex(mask, odd, near, before, old, after, new, radius, keep):
         d1, d2 = row_reach(new_x, new_y, after_x, after_y, row, reach)
         first1, last1 = min(a1, b1), max(a2, b2)
         first2, last2 = min(c1, d1), max(c2, d2)
-        apart = first1 > last2 or first2 > last1
-        if apart and (old_y > row) == (new_y > row):
-            more, wider = change_in_row(mask, odd, near, ends, radius, keep, row, first2, last2)
-            change, growth = change + more, growth + wider
-        else:
-            first1, last1 = min(first1, first2), max(last1, last2)
-        more, wider = change_in_row(mask, odd, near, ends, radius, keep, row, first1, last1)
+        first, last = min(first1, first2), max(last1, last2)
+        more, wider = change_in_row(mask, odd, near, ends, radius, keep, row, first, last)
         change, growth = change + more, growth + wider
     return change, growth
 
@@ -366,10 +357,8 @@ def set_edge_sums(sums, radius, vertices, out, edges, first, last):
     largest = -BARRED
     for k in range(first, last + 1):
         k, after = k % count, (k + 1) % count
-        edges[k] = edge_sum(
-            sums, radius, point(vertices, k), point(out, k), point(vertices, after),
-            point(out, after),
-        )  # fmt: skip
+        a, b = point(vertices, k), point(vertices, after)
+        edges[k] = edge_sum(sums, radius, a, point(out, k), b, point(out, after))
         largest = max(largest, edges[k])
     return largest
 

@@ -81,7 +81,7 @@ def edge_costs(sums, radius, points, out, costs):
     inside = np.empty((size, choices), np.bool_)
     for k in range(size):
         for i in range(choices):
-            inside[k, i] = leaves_room(shape, (points[k, i, 0], points[k, i, 1]), radius + 1.0)
+            inside[k, i] = leaves_room(shape, point(points[k], i), radius + 1.0)
     for k in range(size):
         for ahead in range(costs.shape[1]):
             to = (k + ahead + 1) % size
@@ -89,10 +89,8 @@ def edge_costs(sums, radius, points, out, costs):
                 for j in range(choices):
                     cost = BARRED
                     if inside[k, i] and inside[to, j]:
-                        cost = edge_sum(
-                            sums, radius, (points[k, i, 0], points[k, i, 1]), point(out, k),
-                            (points[to, j, 0], points[to, j, 1]), point(out, to),
-                        )  # fmt: skip
+                        a, b = point(points[k], i), point(points[to], j)
+                        cost = edge_sum(sums, radius, a, point(out, k), b, point(out, to))
                     costs[k, ahead, i, j] = cost
 
 
@@ -108,10 +106,7 @@ def best_ring(costs, start, spread, places, picks):
     came = np.empty((count + 1, size + 1, choices), np.int64)
     best = POSSIBLE
     for first in range(choices):
-        for used in range(count + 1):
-            for place in range(size + 1):
-                for j in range(choices):
-                    least[used, place, j] = BARRED
+        least[:] = BARRED
         least[0, 0, first] = 0
         for place in range(1, size + 1):
             even = place * count // size
@@ -156,11 +151,9 @@ def descend(sums, vertices, radius, directions, steps):
         while True:
             set_bisectors(vertices, out, 0, count - 1)
             set_edge_sums(sums, radius, vertices, out, edges, 0, count - 1)
-            for k in range(count):
-                for axis in range(2):
-                    points[k, 0, axis] = vertices[k, axis]
-                    for i in range(1, choices):
-                        points[k, i, axis] = vertices[k, axis] + step * directions[i - 1, axis]
+            points[:, 0] = vertices
+            for i in range(1, choices):
+                points[:, i] = vertices + step * directions[i - 1]
             edge_costs(sums, radius, points, out, costs)
             # With the directions of what was found, its own sum can be a little higher.
             lowest = min(lowest, edges.sum())
@@ -168,8 +161,7 @@ def descend(sums, vertices, radius, directions, steps):
             if found >= lowest:
                 break
             for k in range(count):
-                for axis in range(2):
-                    moved[places[k], axis] = points[places[k], picks[k], axis]
+                moved[places[k]] = points[places[k], picks[k]]
             if not is_open(moved, 2.0 * radius):
                 break
             lowest = found
@@ -189,9 +181,7 @@ def chosen(sums, points, out, radius, longest, spread, start, rounds, vertices):
             break
         start = places[count // 2]
     if cost < POSSIBLE:
-        for k in range(count):
-            for axis in range(2):
-                vertices[k, axis] = points[places[k], 0, axis]
+        vertices[:] = points[places, 0]
     return cost
 
 
@@ -303,10 +293,9 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
             continue
         added += edge_sum(sums, radius, new, outward, two, point(out, stop)) - edges[edge]
         if jump:
-            added += edge_sum(
-                sums, radius, point(vertices, before), point(out, before), point(vertices, after),
-                point(out, after),
-            ) - edges[before]  # fmt: skip
+            a, b = point(vertices, before), point(vertices, after)
+            added += edge_sum(sums, radius, a, point(out, before), b, point(out, after))
+            added -= edges[before]
         added -= edges[k]
         # Kept with the probability exp(−added/heat).
         if added > heat * draws[move, 3]:

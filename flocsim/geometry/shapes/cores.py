@@ -198,14 +198,12 @@ def parts_in(table: PointTable) -> Parts:
     breaks = np.flatnonzero(np.any(np.diff(names, axis=0) != 0, axis=1)) + 1
     for rows in np.split(np.arange(len(place)), breaks):
         number, hole = names[rows[0]].tolist()
-        if np.any(radius[rows] != radius[rows[0]]):
+        if np.any(radius[part == number] != radius[rows[0]]):
             raise ValueError("core points of a part have several radii")
         # A new part begins with its outer ring; further rings of it are holes.
         if hole == 0 and number == len(found):
             found.append(Part((place[rows],), float(radius[rows[0]])))
         elif number == len(found) - 1 and hole == len(found[-1].rings):
-            if radius[rows[0]] != found[-1].radius:
-                raise ValueError("core points of a part have several radii")
             found[-1] = Part((*found[-1].rings, place[rows]), found[-1].radius)
         else:
             raise ValueError("numbers of parts and rings do not count up from 0")

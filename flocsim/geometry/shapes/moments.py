@@ -62,13 +62,11 @@ def pieces_of(parts: Sequence[Part]) -> Pieces:
 
 def ring_pieces(ring, radius, number):
     """Return the Pieces of one ring of part ``number``, as a tuple."""
-    starts, units, lengths = unit_edges(ring)
+    side_starts, side_units, side_lengths = starts, units, lengths = unit_edges(ring)
     if len(ring) == 1:
         first, turn = np.zeros(1), np.full(1, 2.0 * np.pi)
-        side_starts, side_units, side_lengths = starts, units, lengths
         at_start = at_end = lengths
     else:
-        side_starts, side_units, side_lengths = starts, units, lengths
         if len(ring) == 2:  # a segment has two sides, one in each direction
             side_starts = ring
             side_units, side_lengths = np.vstack([units, -units]), np.tile(lengths, 2)
@@ -82,12 +80,10 @@ def ring_pieces(ring, radius, number):
         turn = np.maximum(bends, 0.0)
         at_start, at_end = trim_lengths(bends, side_lengths, radius)
     each, sides = len(ring), len(side_lengths)
-    return (
-        ring, first, turn, np.full(each, radius), np.full(each, radius**2), np.full(each, number),
-        starts, units, lengths, np.full(len(lengths), radius),
-        side_starts, side_units, side_lengths, at_start, at_end, np.full(sides, radius),
-        np.full(sides, number),
-    )  # fmt: skip
+    points = ring, first, turn, np.full(each, radius), np.full(each, radius**2)
+    edges = starts, units, lengths, np.full(len(lengths), radius)
+    offsets = side_starts, side_units, side_lengths, at_start, at_end, np.full(sides, radius)
+    return *points, np.full(each, number), *edges, *offsets, np.full(sides, number)
 
 
 def lies_on_edge(along, lengths):

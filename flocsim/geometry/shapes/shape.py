@@ -154,10 +154,10 @@ class Shape:
         """Centroid of the swept area in the frame of the given core (2,) [m]."""
         return self.swept.centroid
 
-    @cached_property
+    @property
     def parts(self) -> Parts:
         """Parts of one or more rings each, around the centroid of the whole."""
-        return (Part((self.vertices,), self.radius),)
+        return self.swept.parts
 
     @cached_property
     def is_compound(self) -> bool:

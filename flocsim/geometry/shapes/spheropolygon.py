@@ -5,7 +5,6 @@ al. 2014, section 2.2, eq. 1). A wall is a segment. A Composite is one rigid bod
 """
 
 from collections.abc import Iterable, Sequence
-from functools import cached_property
 from typing import Any
 
 import attrs
@@ -79,10 +78,6 @@ class SpheroPolygon(Shape):
     def __attrs_post_init__(self):
         # Faults of a polygon are reported when it is made, not when it is used.
         self.__dict__["swept"] = swept_parts([Part((self.core, *self.holes), self.radius)])
-
-    @cached_property
-    def parts(self) -> Parts:
-        return self.swept.parts
 
 
 @attrs.frozen(eq=False, slots=False)
@@ -167,10 +162,6 @@ class Composite(Shape):
         made = object.__new__(cls)
         made.__dict__.update(given=swept.parts, swept=swept)
         return made
-
-    @cached_property
-    def parts(self) -> Parts:
-        return self.swept.parts
 
     @property
     def core(self) -> np.ndarray:

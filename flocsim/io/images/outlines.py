@@ -12,6 +12,7 @@ import attrs
 import numpy as np
 
 from flocsim.io.images.background import robust_deviation, sampled, stride_of, strips
+from flocsim.io.images.boxes import Box, beyond, clipped, moved, placed, widened
 from flocsim.io.images.focus import Focus, around, rim
 
 EIGHT = np.ones((3, 3), int)
@@ -84,8 +85,6 @@ SMALLEST = 0.25
 FAINT = 0.25
 """Share of the typical contrast below which a region is not of what the picture shows."""
 
-Box = tuple[slice, slice]
-
 
 @attrs.frozen(eq=False)
 class Outline:
@@ -111,40 +110,6 @@ def pieces(mask: np.ndarray, box: Box) -> Iterator[tuple[np.ndarray, Box]]:
         place = [slice(out.start + s.start, out.start + s.stop)
                  for out, s in zip(box, inner, strict=True)]  # fmt: skip
         yield parts[inner] == number, (place[0], place[1])
-
-
-def beyond(box: Box, by: int) -> Box:
-    """A box that is wider by some pixels on every side, be they in the picture or not."""
-    rows, columns = box
-    return slice(rows.start - by, rows.stop + by), slice(columns.start - by, columns.stop + by)
-
-
-def clipped(box: Box, shape: tuple[int, ...]) -> Box:
-    """The part of a box that lies in a picture."""
-    rows, columns = (slice(max(s.start, 0), min(s.stop, size))
-                     for s, size in zip(box, shape, strict=True))  # fmt: skip
-    return rows, columns
-
-
-def moved(box: Box, down: int, right: int) -> Box:
-    """A box that begins so many rows and columns further on."""
-    rows, columns = box
-    return (slice(rows.start + down, rows.stop + down),
-            slice(columns.start + right, columns.stop + right))  # fmt: skip
-
-
-def placed(mask: np.ndarray, box: Box, wide: Box) -> np.ndarray:
-    """A mask in a wider box."""
-    found = np.zeros([s.stop - s.start for s in wide], mask.dtype)
-    y, x = (s.start - w.start for s, w in zip(box, wide, strict=True))
-    found[y : y + mask.shape[0], x : x + mask.shape[1]] = mask
-    return found
-
-
-def widened(mask: np.ndarray, box: Box, by: int, shape: tuple[int, ...]) -> tuple[np.ndarray, Box]:
-    """A mask in a box that is wider by some pixels, as far as the picture goes."""
-    wide = clipped(beyond(box, by), shape)
-    return placed(mask, box, wide), wide
 
 
 def background_noise(contrast: np.ndarray, fine: float, scale: float) -> tuple[float, float]:
@@ -350,7 +315,7 @@ class Search:
 
     def level(self, focus, mask, box, base):
         """The level in the middle of those of the lowest edge."""
-        values, square_slopes = around(focus.contrast, mask, (box[0].start, box[1].start))
+        values, square_slopes = around(focus.contrast, mask, box)
         values -= base
         top = float(np.quantile(values, 1.0 - self.saturated))
         least = max(1e-3, 0.01 * top)

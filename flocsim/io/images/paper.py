@@ -72,7 +72,5 @@ def segment_as_paper(
     )
     seen = stretched > level
     foreground = filled(seen)
-    return Segmentation(
-        foreground, regions, rejected, flocs, level, whole, foreground & ~seen,
-        bool(burnt_in.any()),
-    )  # fmt: skip
+    holes, annotated = foreground & ~seen, bool(burnt_in.any())
+    return Segmentation(foreground, regions, rejected, flocs, level, whole, holes, annotated)

@@ -188,10 +188,8 @@ def segment(
     if threshold is None:
         levels = [each.level for each in regions or rejected]
         threshold = float(np.median(levels)) if levels else float("nan")
-    return Segmentation(
-        foreground, regions, rejected, flocs, threshold, whole, foreground & ~seen,
-        bool(burnt_in.any()),
-    )  # fmt: skip
+    holes, annotated = foreground & ~seen, bool(burnt_in.any())
+    return Segmentation(foreground, regions, rejected, flocs, threshold, whole, holes, annotated)
 
 
 def guess_polarity(smooth: np.ndarray, light: np.ndarray | None = None) -> str:

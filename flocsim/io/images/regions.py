@@ -4,18 +4,16 @@ import attrs
 import numpy as np
 
 from flocsim.geometry.shapes.outline import ShapeMeasures, feret_diameters
-from flocsim.io.images.focus import along
+from flocsim.io.images.boxes import beyond, placed, widened
+from flocsim.io.images.focus import rim, square_slopes
 from flocsim.io.images.outlines import (
     BAND,
     EIGHT,
     PIXEL,
     SHARP,
-    beyond,
     distances,
     filled,
     pieces,
-    placed,
-    widened,
 )
 
 NECK = 0.5
@@ -117,13 +115,12 @@ def sorted_out(outlines, shape, filters, numbers=None):
     found = []
     for place, each in enumerate(outlines):
         mask, box = each.mask, each.box
-        radius = float(np.sqrt(mask.sum() / np.pi))
-        found.append(Region(
-            0 if numbers is None else numbers[place], centroid_of(mask, box),
-            (box[0].start, box[1].start, box[0].stop, box[1].stop), int(mask.sum()), radius,
-            placed(mask, box, beyond(box, 1)), each.softness, each.level, each.base, each.parted,
-            reason=reason_to_reject(box, shape, radius, each.softness, filters),
-        ))  # fmt: skip
+        radius, label = float(np.sqrt(mask.sum() / np.pi)), 0 if numbers is None else numbers[place]
+        bbox = box[0].start, box[1].start, box[0].stop, box[1].stop
+        measured = label, centroid_of(mask, box), bbox, int(mask.sum()), radius
+        cut = placed(mask, box, beyond(box, 1)), each.softness, each.level, each.base, each.parted
+        reason = reason_to_reject(box, shape, radius, each.softness, filters)
+        found.append(Region(*measured, *cut, reason=reason))
     kept, left = ([each for each in found if bool(each.reason) == out] for out in (False, True))
     if numbers is None:
         counted = [attrs.evolve(each, label=n) for n, each in enumerate([*kept, *left], start=1)]
@@ -152,8 +149,8 @@ def with_band(region, taken, contrast):
     reach = int(np.ceil(2.0 + region.blur)) if np.isfinite(region.blur) else 2
     wide, place = widened(mask, box, reach, contrast.shape)
     near = contrast[place]
-    slope = float(np.median(along(near.astype(np.float32), wide, (0, 0), 0)))
-    change = np.hypot(BAND * (region.level - region.base), PIXEL * slope)
+    slopes = np.sqrt(square_slopes(near.astype(np.float32))[rim(wide)])
+    change = np.hypot(BAND * (region.level - region.base), PIXEL * float(np.median(slopes)))
     inner = largest_piece(filled(wide & (near > region.level + change)), wide)
     around = (distances(~wide) <= reach) & ~(taken[place] & ~wide)
     outer = largest_piece(filled(wide | (around & (near > region.level - change))), wide)
@@ -242,31 +239,18 @@ def confidence(parts, width):
 def bodies(mask, neck, min_radius):
     """The mask's pixels numbered by body, from 1, 0 outside; and the width of the widest neck that
     is cut, as a share of the smaller body's."""
+    from skimage.feature import peak_local_max
     from skimage.segmentation import watershed
 
     depth = distances(np.pad(mask, 1))[1:-1, 1:-1]
-    peaks = peaks_of(depth, max(1, int(0.5 * min_radius)))
+    apart = max(1, int(0.5 * min_radius))
+    peaks = peak_local_max(depth, min_distance=apart, exclude_border=False)
     if not has_neck(depth, peaks, neck):
         return mask.astype(int), 1.0
     markers = np.zeros(mask.shape, int)
     markers[tuple(peaks.T)] = np.arange(1, len(peaks) + 1)
     basins = watershed(-depth, markers, connectivity=2, mask=mask)
     return joined(basins, depth, neck, min_radius)
-
-
-def peaks_of(depth, apart):
-    """(n, 2) the pixels that are as high as all within a distance, the highest first, and no two of
-    them nearer than that: as scikit-image's peak_local_max has them."""
-    from scipy.ndimage import maximum_filter
-
-    highest = (depth == maximum_filter(depth, 2 * apart + 1)) & (depth > depth.min())
-    left = np.argwhere(highest)
-    left = left[np.argsort(-depth[highest], kind="stable")]
-    found = []
-    while len(left):
-        found.append(left[0])
-        left = left[np.abs(left - left[0]).max(axis=1) >= apart]
-    return np.array(found, int).reshape(-1, 2)
 
 
 def has_neck(depth, peaks, neck):

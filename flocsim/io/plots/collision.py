@@ -11,9 +11,8 @@ import numpy as np
 
 from flocsim.io.files import Rule
 from flocsim.io.plots import style
-from flocsim.io.plots.style import CONTACT_COLOUR, Figure, drawing, plain
+from flocsim.io.plots.style import CONTACT_COLOUR, MICRO, Figure, drawing, plain
 
-MICRO = 1e6
 INSIDE_COLOUR = "#DCEBF5"
 PALE = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
 """Behind text that lines may cross."""
@@ -23,6 +22,9 @@ RING: dict[str, Any] = {
     "markeredgecolor": CONTACT_COLOUR, "markeredgewidth": 1.2,
 }  # fmt: skip
 """Of a contact point."""
+
+PATH: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (3, 1.5))}
+"""Of the way of a body's centre."""
 
 GRID = 24
 """Points along a side at which a place for a name is looked for."""
@@ -92,11 +94,11 @@ def name_bodies(axes, frame, names):
     """Each body's name where it is widest, clear of the path drawn there."""
     from matplotlib.patheffects import withStroke
 
-    halo = [withStroke(linewidth=3.0, foreground="white")]
+    look = {"ha": "center", "va": "center", "fontsize": 9, "weight": "bold", "zorder": 7}
+    look["path_effects"] = [withStroke(linewidth=3.0, foreground="white")]
     for number, (body, name) in enumerate(zip(frame, names, strict=True)):
         colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
-        axes.text(*deepest_inside(max(body, key=len)), name, ha="center", va="center", fontsize=9,
-                  color=colour, weight="bold", zorder=7, path_effects=halo)  # fmt: skip
+        axes.text(*deepest_inside(max(body, key=len)), name, color=colour, **look)
 
 
 def deepest_inside(polygon):
@@ -122,17 +124,13 @@ def strip_keys(names):
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    shown = list(enumerate(names))[: len(style.BODY_COLOURS)]
     keys = [
-        Patch(facecolor=(style.BODY_COLOURS[number], 0.3), edgecolor=style.BODY_COLOURS[number],
-              label=f"body {name}")
-        for number, name in shown
-    ]  # fmt: skip
+        Patch(facecolor=(colour, 0.3), edgecolor=colour, label=f"body {name}")
+        for colour, name in zip(style.BODY_COLOURS, names, strict=False)
+    ]
     seen = f", seen from {names[0]}" if len(names) > 1 else ""
-    keys.append(Line2D([], [], color="0.4", linewidth=0.8, linestyle=(0, (3, 1.5)),
-                       label=f"path of a body's centre, whole run{seen}"))  # fmt: skip
-    keys.append(Line2D([], [], **RING, label="contact"))
-    return keys
+    way = Line2D([], [], color="0.4", label=f"path of a body's centre, whole run{seen}", **PATH)
+    return [*keys, way, Line2D([], [], **RING, label="contact")]
 
 
 @contextlib.contextmanager
@@ -185,8 +183,8 @@ def draw_forces(
         if (largest := largest_of(curves)) > 0.0:
             axes.set_yscale("log")
             axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="pushes —   pulls - -",
-                    alignment="left")  # fmt: skip
+        words = "pushes —   pulls - -"
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title=words, alignment="left")
     return axes.figure
 
 
@@ -305,18 +303,15 @@ def time_unit(times):
 
 def draw_frame(axes, paths, frame, contacts):
     """The bodies, the paths of their centres, and the points where they touch."""
-    from matplotlib.patches import PathPatch, Polygon
+    from matplotlib.patches import PathPatch
 
     for number, path in enumerate(map(np.asarray, paths)):
         colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
-        axes.plot(path[:, 0], path[:, 1], color=colour, linewidth=0.8, linestyle=(0, (3, 1.5)))
+        axes.plot(path[:, 0], path[:, 1], color=colour, **PATH)
     for number, body in enumerate(frame):
         colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
         look = {"facecolor": (colour, 0.3), "edgecolor": colour, "lw": 0.9}
-        if len(body) == 1:
-            axes.add_patch(Polygon(body[0], **look))
-        else:
-            axes.add_patch(PathPatch(rings_path(body), **look))
+        axes.add_patch(PathPatch(rings_path(body), **look))
     points = np.asarray(contacts, dtype=float).reshape(-1, 2)
     axes.plot(points[:, 0], points[:, 1], zorder=5, **RING)
 

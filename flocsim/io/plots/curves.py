@@ -11,7 +11,7 @@ import numpy as np
 
 from flocsim.io.plots import outcomes, style
 from flocsim.io.plots.results import BARS, LABELS, PANEL_SIZE, ROOM, panel_grid
-from flocsim.io.plots.style import Figure, drawing, plain
+from flocsim.io.plots.style import MICRO, Figure, drawing, plain
 from flocsim.io.results.events import ENDS_COUNTED
 from flocsim.io.results.schema import Results
 from flocsim.io.results.strength_file import FAILED, OPENED, OPENS_AT_LEAST, Strengths
@@ -179,7 +179,6 @@ SWEEP_FIGURES: dict[str, dict[str, Callable[[Any], Figure]]] = {
 """Figures of a joined file, by the first of its groups."""
 
 
-MICRO = 1e6
 MOST_LINES = 6
 BOUND_WORDS = "no hydrodynamic interaction: upper bounds"
 WATER_WORDS = "with hydrodynamic interaction"
@@ -234,11 +233,8 @@ def draw_line(axes, kernel, name, place, colour):
     look = {"color": colour, "marker": style.marker(v)}
     if kernel.vertices[v] == 1:
         look |= {"linestyle": ":", "markerfacecolor": "white"}
-    axes.errorbar(
-        ratio[known], value[known],
-        yerr=np.maximum([(value - low)[known], (high - value)[known]], 0.0),
-        linewidth=1.0, elinewidth=0.7, markersize=3.5, **look,
-    )  # fmt: skip
+    reach = np.maximum([(value - low)[known], (high - value)[known]], 0.0)
+    axes.errorbar(ratio[known], value[known], reach, lw=1.0, elinewidth=0.7, ms=3.5, **look)
 
 
 def legend(axes, kernel, colours):
@@ -281,8 +277,8 @@ def over_rate(found: Strengths) -> Figure:
                 rates, shares = shares_opened(found, number, place)
                 any_opened += len(rates)
                 if len(rates):
-                    axes.plot(rates, shares, drawstyle="steps-post", color=colours[place],
-                              marker=style.marker(place), markersize=3)  # fmt: skip
+                    look = {"color": colours[place], "marker": style.marker(place)}
+                    axes.plot(rates, shares, drawstyle="steps-post", markersize=3, **look)
             axes.set(ylim=(0.0, 1.04), xscale="log")
             if not any_opened:
                 style.note(axes, "no bond opened")

@@ -79,10 +79,10 @@ def draw_ends(
     """Bars (k,) stacked to 1 at these places, ``width`` and ``shift`` in points."""
     total = np.maximum(np.asarray(counts["n_total"]), 1)
     base = np.zeros(len(places))
+    look = {"linewidth": width, "capstyle": "butt", "transform": shifted(axes, shift)}
     for word, number in ends_of(counts).items():
         top = base + number / total
-        axes.vlines(places, base, top, color=COLOURS[word], linewidth=width, capstyle="butt",
-                    transform=shifted(axes, shift), label=word)  # fmt: skip
+        axes.vlines(places, base, top, color=COLOURS[word], label=word, **look)
         base = top
 
 
@@ -90,11 +90,11 @@ def mark_causes(
     axes: Any, places: np.ndarray, causes: np.ndarray, colour: Any, shift: float = 0.0
 ) -> set[str]:
     """A letter on the axis at each place (k,) that has a cause; the causes that were marked."""
+    look = {"color": colour, "clip_on": False, "transform": shifted(axes, shift)}
+    look |= {"linestyle": "", "ms": 4.5, "markeredgewidth": 0.2}
     for word in (found := {str(each) for each in causes if each}):
         at = places[causes == word]
-        axes.plot(at, np.full(len(at), MARK_AT), linestyle="", marker=f"${LETTERS[word]}$", ms=4.5,
-                  color=colour, markeredgewidth=0.2, clip_on=False,
-                  transform=shifted(axes, shift))  # fmt: skip
+        axes.plot(at, np.full(len(at), MARK_AT), marker=f"${LETTERS[word]}$", **look)
     return found
 
 
@@ -231,25 +231,23 @@ def draw_bars(axes, places, bands, index, colour, few=None, shift=0.0):
     value, low, high, lowers, raises = bands
     reach = np.clip([value - low, high - value], 0.0, None)
     size, width = (2.2, 0.8) if len(places) > style.CROWDED else (4.0, 1.2)
-    where = shifted(axes, shift)
-    axes.errorbar(places, value, reach, capsize=0, clip_on=False, color=colour,
-                  marker=style.marker(index), ms=size, lw=width,
-                  elinewidth=0.6 * width, transform=where)  # fmt: skip
+    thin, thinner = 0.6 * width, 0.2 * width
+    moved = {"transform": shifted(axes, shift)}
+    whole = moved | {"clip_on": False}
+    points = whole | {"color": colour, "marker": style.marker(index), "ms": size}
+    axes.errorbar(places, value, reach, lw=width, elinewidth=thin, **points)
     if few is not None and few.any():
-        axes.plot(places[few], value[few], linestyle="", marker=style.marker(index),
-                  ms=size, color=colour, mfc="white", clip_on=False, zorder=3,
-                  transform=where)  # fmt: skip
+        axes.plot(places[few], value[few], linestyle="", mfc="white", zorder=3, **points)
     alone = ~np.isfinite(value) & np.isfinite(high)
     if alone.any():
-        axes.vlines(places[alone], low[alone], high[alone], color=colour, linestyle=":",
-                    linewidth=0.6 * width, transform=where)  # fmt: skip
+        axes.vlines(places[alone], low[alone], high[alone], colour, ":", lw=thin, **moved)
     if np.any((lowers < 0.0) | (raises > 0.0)):
         down, up = np.minimum(np.nan_to_num(lowers), 0.0), np.maximum(np.nan_to_num(raises), 0.0)
         outer = [value - np.maximum(low + down, 0.0), np.minimum(high + up, 1.0) - value]
-        thin = 0.2 * width
-        axes.errorbar(places, value, np.clip(outer, 0.0, None), capsize=1.5, clip_on=False,
-                      fmt="none", ecolor=colour, elinewidth=thin, capthick=thin,
-                      transform=where)  # fmt: skip
+        outer, bars = np.clip(outer, 0.0, None), whole | {"fmt": "none", "ecolor": colour}
+        axes.errorbar(
+            places, value, outer, capsize=1.5, elinewidth=thinner, capthick=thinner, **bars
+        )
 
 
 def note_if_empty(axes, values, text):
@@ -390,14 +388,15 @@ def shape_effects(results: Results) -> Figure:
 
 def draw_effect(axes, effect):
     """Pr[A] with its intervals, and the classes, against a measure."""
+    measure, known = effect.measure, effect.measure.size
     for index, (name, colour) in enumerate(style.CLASS_COLOURS.items()):
-        if effect.measure.size:
-            axes.plot(effect.measure, effect.pr_class[0, index], color=colour, linewidth=0.9,
-                      marker=style.MARKERS[1 + index], ms=2.5, label=name)  # fmt: skip
-    value, low, high = effect.pr_a if effect.measure.size else np.empty((3, 0))
+        if known:
+            look = {"color": colour, "marker": style.MARKERS[1 + index]}
+            axes.plot(measure, effect.pr_class[0, index], lw=0.9, ms=2.5, label=name, **look)
+    value, low, high = effect.pr_a if known else np.empty((3, 0))
     reach = np.clip([value - low, high - value], 0.0, None)
-    axes.errorbar(effect.measure, value, reach, color=ALL_COLOUR, marker=style.MARKERS[0], ms=3.5,
-                  elinewidth=0.8, clip_on=False)  # fmt: skip
+    look = {"color": ALL_COLOUR, "marker": style.MARKERS[0], "clip_on": False}
+    axes.errorbar(measure, value, reach, ms=3.5, elinewidth=0.8, **look)
     if not np.isfinite(value).any():
         style.note(axes, "no decided collision\nof known shapes")
 

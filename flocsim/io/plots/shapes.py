@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 CLASS_LIMIT = 5.0
 """r_eq [px] that separates the two size classes of Fig. 3 (the paper's 5 µm at 1 µm a pixel)."""
 
-BAR_COLOUR = "#56B4E9"
+BARS = {"color": "#56B4E9", "edgecolor": "white", "linewidth": 0.5}
 CLASS_STYLES = (("≤", "#D55E00", "o"), (">", "#0072B2", "s"))
 DODGE = 0.06
 """Shift of the two classes against each other, in steps of the axis of N."""
@@ -58,7 +58,7 @@ def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
     bins = bins_of(sizes, 0.0)
     with drawing(4.2, 2.8) as figure:
         axes = figure.subplots()
-        axes.hist(sizes, bins=bins, color=BAR_COLOUR, edgecolor="white", linewidth=0.5)
+        axes.hist(sizes, bins=bins, **BARS)
         marks = ((np.median(sizes), "median", "--"), (sizes.mean(), "mean", ":"))
         for value, name, dashes in marks:
             axes.axvline(value, color="0.25", linestyle=dashes, label=f"{name} {value:.3g} µm")
@@ -86,14 +86,12 @@ def sizes(entries: Sequence[ShapeEntry]) -> Figure:
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, word, by_volume in zip(panels, ("number", "volume"), (False, True), strict=True):
             weights = found**3 if by_volume else np.ones(found.size)
-            bars, _, _ = axes.hist(found, bins=bins, weights=weights / weights.sum(),
-                                   color=BAR_COLOUR, edgecolor="white",
-                                   linewidth=0.5)  # fmt: skip
+            bars, _, _ = axes.hist(found, bins=bins, weights=weights / weights.sum(), **BARS)
             top = max(top, bars.max())
             marks = zip(diameters_at(found, by_volume), SHARES, (":", "--", "-."), strict=True)
             for value, share, dashes in marks:
-                axes.axvline(value, ymax=BELOW_LEGEND, color="0.25", linestyle=dashes,
-                             label=f"D{100 * share:.0f} = {value:.3g} µm")  # fmt: skip
+                label = f"D{100 * share:.0f} = {value:.3g} µm"
+                axes.axvline(value, ymax=BELOW_LEGEND, color="0.25", linestyle=dashes, label=label)
             axes.set(title=f"by {word}", xlabel="diameter $2r_\\mathrm{eq}$ [µm]")
             axes.set_xlim(left=0.0)
             axes.legend(loc="upper left")
@@ -111,10 +109,9 @@ def shape(entries: Sequence[ShapeEntry]) -> Figure:
         panels = figure.subplots(2, 2).ravel()
         for axes, (name, label) in zip(panels, MEASURES.items(), strict=False):
             values = np.array([getattr(each, name) for each in found])
-            axes.hist(values, bins=bins_of(values, values.min()), color=BAR_COLOUR,
-                      edgecolor="white", linewidth=0.5)  # fmt: skip
-            axes.axvline(np.median(values), color="0.25", linestyle="--",
-                         label=f"median {np.median(values):.3g}")  # fmt: skip
+            axes.hist(values, bins=bins_of(values, values.min()), **BARS)
+            middle = np.median(values)
+            axes.axvline(middle, color="0.25", linestyle="--", label=f"median {middle:.3g}")
             room = 1.2 * axes.get_ylim()[1]  # for the legend above the bars
             axes.set(xlabel=label, ylabel="number of flocs", ylim=(0.0, room))
             axes.yaxis.get_major_locator().set_params(integer=True)
@@ -168,10 +165,10 @@ def draw_errors(axes, entries):
             continue
         errors = np.array([[e.fits[n].relative_error for n in counts] for e in members])
         mean, spread = errors.mean(axis=0), errors.std(axis=0)
-        below = np.minimum(spread, mean)
+        reach = [np.minimum(spread, mean), spread]
         label = rf"$r_\mathrm{{eq}}$ {sign} {CLASS_LIMIT:g} px ({len(members)})"
-        axes.errorbar(places + shift, mean, [below, spread], color=colour, marker=marker,
-                      elinewidth=0.7, capsize=2, label=label)  # fmt: skip
+        look = {"color": colour, "marker": marker, "label": label}
+        axes.errorbar(places + shift, mean, reach, elinewidth=0.7, capsize=2, **look)
         if 1 in entries[0].fits:
             spheres = np.mean([e.fits[1].relative_error for e in members])
             axes.axhline(spheres, color=colour, linestyle="--", linewidth=0.8)
@@ -312,8 +309,9 @@ class Labels:
         boxes = [self.inside(x, y, width, height) for x, y in corners]
         box = next(filter(self.is_free, boxes), boxes[0])
         self.taken.append(box)
-        self.axes.text(box[0], box[1], text, color=colour, fontsize=size, va="top", ha="left",
-                       path_effects=[withStroke(linewidth=0.9, foreground="black")])  # fmt: skip
+        around = [withStroke(linewidth=0.9, foreground="black")]
+        look = {"va": "top", "ha": "left", "path_effects": around}
+        self.axes.text(box[0], box[1], text, color=colour, fontsize=size, **look)
 
     def inside(self, x, y, width, height):
         x = min(max(x, 0.0), max(self.shape[1] - 1.0 - width, 0.0))

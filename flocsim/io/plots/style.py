@@ -21,6 +21,9 @@ from flocsim.io.outputs import check_ending
 Figure = Any
 """A matplotlib Figure: no hint may load matplotlib."""
 
+MICRO = 1e6
+"""Micrometres of a metre."""
+
 LAST = 1500
 """Milliseconds for which an animation shows its last frame."""
 

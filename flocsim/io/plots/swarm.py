@@ -16,6 +16,7 @@ from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from flocsim.io.files import Rule
 from flocsim.io.plots.collision import rings_path
 from flocsim.io.plots.style import (
+    MICRO,
     Figure,
     drawing,
     frame_of,
@@ -25,7 +26,6 @@ from flocsim.io.plots.style import (
 )
 from flocsim.io.results.swarm_file import GONE, POINTS, RINGS, SwarmResults, mean
 
-MICRO = 1e6
 MOST_POINTS = 160
 """Points of an outline that is drawn: arcs finer than a picture of many bodies shows are left."""
 
@@ -119,8 +119,8 @@ def sizes(results: SwarmResults) -> Figure:
             found = np.concatenate([np.bincount(own)[own] for own in inside])
             values, number = np.unique(found, return_counts=True)
             share = np.cumsum(number) / number.sum()
-            axes.step(np.append(values, values[-1] * 1.3), np.append(share, 1.0), where="post",
-                      color=colour, label=f"{times[place]:.4g} s")  # fmt: skip
+            ends, shares = np.append(values, values[-1] * 1.3), np.append(share, 1.0)
+            axes.step(ends, shares, where="post", color=colour, label=f"{times[place]:.4g} s")
         axes.set(xscale="log", ylim=(0.0, 1.03), xlabel="bodies in the cluster",
                  ylabel="share of bodies in clusters\nup to that size")  # fmt: skip
         set_log_axis(axes.xaxis)
@@ -137,8 +137,8 @@ def speed(results: SwarmResults) -> Figure:
         axes = figure.subplots()
         for colour, place in zip(graded_colours(len(chosen)), chosen, strict=True):
             rows = shown & (found["cluster_time"] == place)
-            axes.plot(MICRO * found["cluster_gyration"][rows], 1e3 * found["cluster_speed"][rows],
-                      "o", color=colour, markersize=3.0, label=f"{times[place]:.4g} s")  # fmt: skip
+            size, fall = MICRO * found["cluster_gyration"][rows], 1e3 * found["cluster_speed"][rows]
+            axes.plot(size, fall, "o", color=colour, ms=3.0, label=f"{times[place]:.4g} s")
         axes.set(xlabel="radius of gyration [µm]", ylabel="settling [mm/s]")
         if shown.any():
             axes.set(xscale="log", yscale="log")

@@ -223,10 +223,8 @@ class Clusters:
         radius = hydrodynamic_radii(known, own, label, ~percolates)
         whole = np.full(len(bodies), -1)
         whole[free] = label
-        return cls(
-            whole, np.bincount(label, minlength=count), total, area, gyration, radius, motion,
-            np.clip(1.0 - area / hulls, 0.0, 1.0), percolates,
-        )  # fmt: skip
+        size, porosity = np.bincount(label, minlength=count), np.clip(1.0 - area / hulls, 0.0, 1.0)
+        return cls(whole, size, total, area, gyration, radius, motion, porosity, percolates)
 
     def __len__(self) -> int:
         return len(self.size)
