@@ -21,7 +21,9 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 # Compiled code of the tests is kept apart from the user's, for all checkouts of this machine: a
 # file of it is named by all that it is made of.
 CACHE = disk_cache.cache_folder() / "tests"
-if not disk_cache.is_writable(CACHE):
+try:
+    CACHE.mkdir(parents=True, exist_ok=True)
+except OSError:
     CACHE = Path(__file__).parents[1] / ".pytest_cache" / "flocsim"
 os.environ.setdefault("FLOCSIM_CACHE", str(CACHE))
 
@@ -49,7 +51,17 @@ def pytest_runtestloop():
 
 
 # What a test's commands print must not depend on what was compiled before it.
-units.WORTH_SAYING = 3600.0
+say_what_is_compiled = units.say
+units.say = lambda what: None
+
+
+@pytest.fixture
+def speaking(monkeypatch):
+    """What is compiled is said, as in a new process."""
+    monkeypatch.setattr(units, "say", say_what_is_compiled)
+    monkeypatch.setattr(units, "quiet", False)
+    monkeypatch.setattr(units, "_said", set())
+
 
 # A first call may compile a kernel, so a deadline per example would fail on speed alone.
 for profile, examples in (("few", 30), ("many", 100)):

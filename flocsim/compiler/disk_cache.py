@@ -32,12 +32,6 @@ def cache_folder() -> Path:
     return Path(os.environ.get("FLOCSIM_CACHE") or platformdirs.user_cache_dir("flocsim"))
 
 
-def is_writable(folder: Path) -> bool:
-    """Return True if files can be written to a folder, or it can be made."""
-    existing = next(each for each in (folder, *folder.parents) if os.path.exists(each))
-    return os.access(existing, os.W_OK | os.X_OK)
-
-
 def file_name(name: str, key: str) -> str:
     """Return the file name for content called ``name``; ``key`` is what else it depends on."""
     return f"{name}-{hashlib.blake2b(key.encode(), digest_size=8).hexdigest()}{SUFFIX}"
@@ -92,9 +86,8 @@ def write(name: str, key: str, data: bytes) -> None:
 
 
 def has(name: str) -> bool:
-    """Return True if something was written under a name, or nothing can be written."""
-    folder = cache_folder()
-    return any(folder.glob(f"{name}-*{SUFFIX}")) or not is_writable(folder)
+    """Return True if something was written under a name."""
+    return any(cache_folder().glob(f"{name}-*{SUFFIX}"))
 
 
 def kept(name: str, key: str, make: Callable[[], bytes]) -> bytes:

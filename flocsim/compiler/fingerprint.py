@@ -1,15 +1,14 @@
 """Hash of what a function does: its bytecode, its constants and all that it reaches by globals.
 
 The hash names a file of machine code, so it has to cover all that the machine code depends on.
-Numbers, texts, tuples of them, enums and named tuples enter by value; functions of Python,
+Numbers, texts, tuples of them and named tuples enter by value; functions of Python,
 numpy and numba enter by name, as the versions of these are in the hash. Anything else is refused
 with file, line and name: it could change, and the stored machine code would then be stale.
 
 Kernels run without the interpreter's lock, so that a kernel that prints is refused as well.
 """
 
-import builtins
-import enum
+import dis
 import functools
 import hashlib
 import inspect
@@ -20,7 +19,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flocsim.compiler.linker import Linker, is_library, is_versioned, reads, refuse_closure, where
+from flocsim.compiler.linker import (
+    Linker,
+    codes_in,
+    is_library,
+    is_versioned,
+    reads,
+    refuse_closure,
+    where,
+)
 from flocsim.compiler.processor import versions
 from flocsim.errors import KernelError
 
@@ -45,11 +52,6 @@ def value_text(value: Any) -> str:
         return f"intrinsic {value.name}"
     if isinstance(value, np.number | np.bool_):
         return f"{kind} {value!r}"
-    if isinstance(value, enum.Enum):
-        return f"{value.name} of {value_text(kind)}"
-    if isinstance(value, type) and issubclass(value, enum.Enum):
-        members = tuple((name, each.value) for name, each in value.__members__.items())
-        return f"class {value.__name__}{value.__bases__} {value_text(members)}"
     if is_named_tuple(kind):
         return f"{value_text(kind)}({', '.join(map(value_text, value))})"
     if is_named_tuple(value):
@@ -78,8 +80,8 @@ def refusal(value: Any) -> str:
     if callable(value):
         what = f"the class {value.__name__}" if isinstance(value, type) else f"a {kind.__name__}"
         return (
-            f"{what}, whose code no hash follows; write a plain function with `def`, a named tuple "
-            "or an enum of numbers"
+            f"{what}, whose code no hash follows; write a plain function with `def`, or a named "
+            "tuple of numbers"
         )
     return f"a {kind.__name__} that can change; make it a parameter or a tuple of numbers"
 
@@ -153,6 +155,18 @@ def describe(entry: Any) -> Description:
     return Description(lines, functions, calls)
 
 
+def refuse_python(function: Any) -> None:
+    """Raise KernelError where a function prints or raises, which compiled code cannot do while it
+    runs."""
+    operations = {one.opname for each in codes_in(function.__code__) for one in dis.Bytecode(each)}
+    if "RAISE_VARARGS" in operations or any(each is print for each in reads(function).values()):
+        raise KernelError(
+            f"kernel {where(function)} prints, raises an exception or asserts, which compiled code "
+            "cannot: return math.nan where there is no answer, and call it from Python to look "
+            "into it"
+        )
+
+
 def hashed(lines: Iterable[str], options: str) -> str:
     """Return the hash of lines, of how they are compiled, and of all versions."""
     text = "\n".join([repr(versions()), options, *lines])
@@ -174,10 +188,5 @@ def fingerprint(
         units[name] = describe(function)
         pending |= {x: y for x, y in units[name].calls.items() if x not in units}
     for function in (each for unit in units.values() for each in unit.functions):
-        for chain, value in reads(function).items():
-            if value is builtins.print:
-                raise KernelError(
-                    f"kernel {where(function)} calls {'.'.join(chain)}: compiled code cannot call "
-                    "Python while it runs; take it out (to look into a kernel, call it from Python)"
-                )
+        refuse_python(function)
     return hashed([f"{name}={units[name].lines}" for name in sorted(units)], options)

@@ -273,18 +273,6 @@ def set_field(context, builder, sig, args, name):
     store(context, builder, kind.fields[name][0], args[1], place, f"{kind}.{name}")
 
 
-@type_callable(len)
-def type_len(context):
-    """Return the type of ``len`` of an array."""
-    return lambda value: types.intp if isinstance(value, Elements) else None
-
-
-@lower_builtin(len, Elements)
-def length(context, builder, sig, args):
-    """Return the first size of an array."""
-    return size(builder, sig.args[0], args[0], 0)
-
-
 @type_callable(operator.getitem)
 def type_getitem(context):
     """Return the type of an element."""

@@ -20,7 +20,7 @@ import pickle
 import re
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,9 +40,6 @@ from flocsim.process import COMPILING, lacking
 INLINED_SIZE = 400
 
 SCALARS_ONLY = "use plain arithmetic on scalars, without arrays and lists"
-
-# Seconds after which a line says what is compiled.
-WORTH_SAYING = 3.0
 
 # Nothing is said: in processes of which another one speaks.
 quiet = False
@@ -178,9 +175,7 @@ class Engine:
         """Prepare for compiling, until all units are there."""
         if text := lacking(COMPILING, "compiling"):
             raise FlocsimError(text)  # LLVM ends the process where it gets no memory
-        import numba  # noqa: F401  (takes its time, before that is counted)
-
-        self.stack.enter_context(announced(self.what))
+        say(self.what)
         self.stack.enter_context(accelerator.quick_typing())
         self.stack.callback(accelerator.forget, self.parts)
 
@@ -216,24 +211,11 @@ class Engine:
 
 
 def say(what: str) -> None:
-    """Say on stderr what is compiled."""
-    _said.add(what)
-    text = f"flocsim: first run: compiling {what}, once (up to a minute)"
-    print(text, file=sys.stderr, flush=True)
-
-
-@contextlib.contextmanager
-def announced(what: str) -> Iterator[None]:
-    """Say on stderr what is compiled inside, if it takes more than a moment and has not been said;
-    nothing of ""."""
-    timer = threading.Timer(WORTH_SAYING, say, [what])
-    timer.daemon = True
+    """Say on stderr, once, what is compiled; nothing of ""."""
     if what and not quiet and what not in _said:
-        timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
+        _said.add(what)
+        text = f"flocsim: first run: compiling {what}, once (up to a minute)"
+        print(text, file=sys.stderr, flush=True)
 
 
 def compiler_complaint(text: str) -> str:

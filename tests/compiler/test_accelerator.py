@@ -118,9 +118,7 @@ def lent(x):
     return math.gamma(x)
 
 def raising(x):
-    if x > 1.0:
-        raise ValueError("too large")
-    return x
+    return (0.5, 1.5)[int(x)]
 
 print(compose(numbers, {})(2.5, 3), compose(nothing, {})(1.0), compose(raising, {})(0.5))
 try:

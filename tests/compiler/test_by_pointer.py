@@ -72,7 +72,7 @@ def sizes(outer, k):
     total = 0
     for axis in outer.places.shape:
         total = 10 * total + axis
-    return 100 * total + 10 * len(outer.counts) + len(outer.inner.numbers)
+    return 100 * total + 10 * outer.counts.shape[0] + outer.inner.numbers.shape[0]
 
 
 def mixed(flag, number, view, pair, array):

@@ -57,20 +57,19 @@ def raising(x):
     return x
 
 
-def raising_numbers(x):
-    if x < 0.0:
-        raise ValueError("below", x)
-    return x
+def beyond_the_end(x):
+    return (1.0, 2.0)[int(x)]
 
 
 @pytest.mark.parametrize(
     ("function", "named", "words"),
     [
-        (printing, printing, "calls print"),
-        (calling, printing, "calls print"),
-        (printing_by_another_name, printing_by_another_name, "calls say"),
-        (printing_by_a_module, printing_by_a_module, "calls builtins.print"),
+        (printing, printing, "prints, raises"),
+        (calling, printing, "prints, raises"),
+        (printing_by_another_name, printing_by_another_name, "prints, raises"),
+        (printing_by_a_module, printing_by_a_module, "prints, raises"),
         (going_back, going_back, "reads the global 'numba.objmode'"),
+        (raising, raising, "prints, raises"),
     ],
 )
 def test_a_call_of_python_is_refused_by_file_and_line(function, named, words):
@@ -80,10 +79,10 @@ def test_a_call_of_python_is_refused_by_file_and_line(function, named, words):
 
 
 def test_a_law_and_what_stands_in_for_a_hook_are_looked_at_too():
-    with pytest.raises(KernelError, match="calls print"):
+    with pytest.raises(KernelError, match="prints, raises"):
         compile_law(printing, "printing", lambda: None)
     compose(with_hook, {}, jit=False)
-    with pytest.raises(KernelError, match="calls print"):
+    with pytest.raises(KernelError, match="prints, raises"):
         compose(with_hook, {hooked: printing})
 
 
@@ -92,16 +91,11 @@ def test_uncompiled_functions_may_print(capsys):
     assert capsys.readouterr().out == "2.0\n"
 
 
-def test_an_exception_in_compiled_code_ends_it_as_a_kernel_error():
-    checked = compose(raising, {})
-    assert checked(1.0) == 1.0
+def test_what_raises_by_itself_ends_as_a_kernel_error():
+    checked = compose(beyond_the_end, {})
+    assert checked(1.0) == 2.0
     with pytest.raises(KernelError, match="a kernel has raised an exception"):
-        checked(-1.0)
-
-
-def test_an_exception_with_numbers_in_it_is_refused_by_file_and_line():
-    with pytest.raises(KernelError, match=r"test_refused\.py:\d+: .*; use plain arithmetic"):
-        compose(raising_numbers, {})(1.0)
+        checked(2.0)
 
 
 @attrs.frozen
@@ -114,7 +108,7 @@ class Loud(CentreForce):
 
 def test_a_force_that_prints_is_refused_before_anything_is_compiled():
     system = System([Body(Sphere(5e-6), density=2650.0)] * 2, [Loud()])
-    with pytest.raises(KernelError, match=r"kernel Loud\.kernel \(.*\) calls print"):
+    with pytest.raises(KernelError, match=r"Loud\.kernel \(.*\) prints, raises"):
         system.scene()
     assert system.scene(jit=False).laws
 
@@ -136,5 +130,5 @@ class Loud(CentreForce):
 def test_a_study_whose_force_prints_is_refused_before_it_begins(tmp_path):
     (tmp_path / "loud.py").write_text(LOUD)
     config = load_config(write_small(tmp_path, SMALL + '[forces.loud]\nclass = "loud:Loud"\n'))
-    with pytest.raises(KernelError, match=r"loud\.py:7\) calls print: compiled code"):
+    with pytest.raises(KernelError, match=r"loud\.py:7\) prints, raises"):
         check_study(config)

@@ -28,22 +28,23 @@ vertices = [4, 16, 64]
 [forces.contact]
 k_n = {k_n}
 k_t = {k_t}
+[integrator]
+tolerance = {tolerance}
 """
 
 
 @functools.cache
-def study_of(name, k_n, seed=12):
+def study_of(name, k_n, seed=12, tolerance=1e-9):
     with TemporaryDirectory() as folder:
         path = Path(folder) / "study.toml"
-        path.write_text(STUDY.format(type=name, k_n=k_n, k_t=k_n / 10.0, seed=seed))
+        text = STUDY.format(type=name, k_n=k_n, k_t=k_n / 10.0, seed=seed, tolerance=tolerance)
+        path.write_text(text)
         return Study(load_config(path))
 
 
 @pytest.mark.parametrize(
     ("name", "vertices", "share", "k_n", "replicate", "outcome", "most"),
     [
-        # It holds by its shape: a step that is long against vibrations lets go of it too late.
-        ("I", 64, 0.5, 20.0, 25, "C", 500),
         # It lets go: the overlap by which it seems to hang was the rounding of Newton's method.
         ("III", 16, 0.0, 2000.0, 24, "B", 1000),
         # Two contacts throw each other open in turn, thousands of times.
@@ -58,6 +59,14 @@ def test_what_decides_is_decided_at_its_own_scale(
     row = study_of(name, k_n).run(0, vertices, share, replicate)
     assert OUTCOMES[row["outcome"]] == outcome
     assert row["steps"] < most
+
+
+@pytest.mark.parametrize("tolerance", [8e-11, 1e-10, 1.5e-10, 2e-10])
+def test_a_contact_that_holds_by_its_shape_lets_go_in_time(tolerance):
+    """Its overlap at the end is 1e-12 m. At 1e-9 m it lets go up to 0.15 ms too late, as one that
+    grazes, and some tolerances then decide otherwise."""
+    row = study_of("I", 20.0, tolerance=tolerance).run(0, 64, 0.5, 25)
+    assert OUTCOMES[row["outcome"]] == "C" and row["steps"] < 500
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,7 @@ from flocsim.integrators.loop.step_size import (
     plan,
     reject,
     representable_step,
+    step_to_switch,
 )
 from flocsim.integrators.rhs.forces import copy_motion
 from flocsim.integrators.rhs.friction import rolled, slip_in, slip_rate_of_gap_change
@@ -294,7 +295,7 @@ def advance(scene, work, observed, clock, counts, record):
         if share < 1.0 and trials < MOST_TRIALS:
             trials += 1
             if not ends_early(scene, work, clock, step, ratio, share):
-                limit = share * step
+                limit = step_to_switch(scene, work, step, share)
                 counts.located += 1
                 continue
             step *= share

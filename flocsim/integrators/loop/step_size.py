@@ -11,14 +11,16 @@ closed instead, since the forces are new.
 
 import math
 
+from flocsim.constants import TINY
 from flocsim.geometry.contact.candidates import spendable_share, time_to_spend
 from flocsim.hooks import next_step
+from flocsim.integrators.exponential.collocation import may_be_series
 from flocsim.integrators.loop.kicks import kick_end
 from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
-from flocsim.integrators.rhs.views import contact_view, normal_rate, velocity_lifetime_of
-from flocsim.state.clock import PLAIN
+from flocsim.integrators.rhs.views import contact_view, inertia, normal_rate, velocity_lifetime_of
+from flocsim.state.clock import PLAIN, RADAU
 from flocsim.state.contacts import CLOSED
-from flocsim.state.work import MOST_IN_SERIES, NOW
+from flocsim.state.work import MOST_IN_SERIES, NOW, STIFFNESS
 
 SAFETY = 0.9
 """Fraction of the step at which the error would just meet the tolerance."""
@@ -65,6 +67,10 @@ TOUCH_ERROR_FRACTION = 0.1
 """The error of the first step after a touch is taken as (h ω0)⁴ over this times the displacement
 that the impact leads to; that of a series as (h ω0)⁵ over this times the overlap v/ω0 of the
 impact, for the rotation of the contact normal, which the series does not contain."""
+
+MAX_PHASE = 4.0
+"""Phase ω h [rad], ω being the fastest vibration, up to which the switches inside a series are
+found reliably. A Radau step with a switch in it is repeated as a series of this length."""
 
 LANDING_MARGIN, LANDING_FRACTION = 0.05, 0.5
 """A step across switches ends LANDING_MARGIN tolerances before a pair lands in it; the step that
@@ -154,13 +160,37 @@ def step_behind_touch(scene, work, clock):
             frequency_squared += stiffness / view.effective_mass
             top_speed = max(top_speed, speed)
             displacement = max(displacement, speed * velocity_lifetime_of(work, row))
-    if not (frequency_squared > 0.0 and displacement > 0.0):
+    if not (0.0 < frequency_squared < math.inf and displacement > 0.0):
         return math.inf
     frequency, allowed = math.sqrt(frequency_squared), TOUCH_ERROR_FRACTION * clock.tolerance
     # Solve the error of the step = tolerance for h; see TOUCH_ERROR_FRACTION.
     if work.tally.kind == PLAIN or work.poses.shape[0] > MOST_IN_SERIES:
         return (allowed / displacement) ** 0.25 / frequency
     return (allowed * frequency / top_speed) ** 0.2 / frequency
+
+
+def fastest_vibration(scene, work):
+    """Return the angular frequency of the fastest vibration [1/s], 0 if nothing vibrates."""
+    stiffest = 0.0
+    for body in range(work.poses.shape[0]):
+        if scene.bodies[body].free == 1.0:
+            # Diagonal of M⁻¹K: ω² of each coordinate alone.
+            for axis in range(3):
+                mass = max(inertia(scene, body, axis), TINY)
+                stiffest = max(stiffest, work.jacobian[STIFFNESS, body, axis, axis] / mass)
+    return math.sqrt(stiffest)
+
+
+def step_to_switch(scene, work, step, share):
+    """Return the step [s] to try after one that passed a switch at a fraction of it.
+
+    A Radau step damps vibrations, and the switch may be an artefact of that. Then a series is tried
+    instead, as long as MAX_PHASE allows, but at most half of the step.
+    """
+    fastest = fastest_vibration(scene, work)
+    if work.tally.kind != RADAU or not may_be_series(scene, work) or fastest == 0.0:
+        return share * step
+    return max(share * step, min(0.5 * step, MAX_PHASE / fastest))
 
 
 def plan(scene, work, clock, step, ratio, was_cut, switched):

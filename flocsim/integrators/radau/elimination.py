@@ -10,6 +10,8 @@ The rows of x and y of a cluster's first body are the sums over all its bodies (
 Mutual forces cancel in these sums and are never written. Momentum is exact for that reason.
 """
 
+import math
+
 from flocsim.compiler.linker import loops_apart
 from flocsim.integrators.radau.ordering import NONE, find_pattern, is_edge, is_leader
 from flocsim.integrators.radau.tableau import COMPLEX, EIGENVALUES, REAL
@@ -233,7 +235,8 @@ def swap(blocks, which, block, i, j, row, column):
 
 
 def invert(blocks, which, block):
-    """Replace a diagonal block of a system by its inverse; return False if singular.
+    """Replace a diagonal block of a system by its inverse; return False if it is singular, or too
+    large for that.
 
     Gauss and Jordan's, in place, with row pivoting: stiff contacts leave less accuracy to others.
     """
@@ -245,7 +248,7 @@ def invert(blocks, which, block):
             swap(blocks, which, block, k, j, pivot, j)
         value = number(blocks, which, block, k, k)
         size = value.real * value.real + value.imag * value.imag
-        if not size > 0.0:
+        if not 0.0 < size < math.inf:
             return False
         reciprocal = complex(value.real / size, -value.imag / size)
         put_number(blocks, which, block, k, k, complex(1.0, 0.0))

@@ -393,15 +393,13 @@ def test_an_edit_makes_it_another_study(tmp_path, own_module, first_identity, ed
     assert all(said in line for line in found[:1])
 
 
-WITH_ENUM = """\
-import enum
+WITH_HELPER = """\
 import attrs
 import numba
 from flocsim.fields import quantity
 from flocsim.forces import CentreForce
 
-class Power(enum.Enum):
-    FIRST = 1.0
+FACTOR = 1.0
 
 @numba.{}
 def doubled(x):
@@ -413,9 +411,9 @@ class Mine(CentreForce):
 
     @staticmethod
     def kernel(pair, strength):
-        return doubled(strength) * Power.FIRST.value
+        return doubled(strength) * FACTOR
 """
-WITH_ENUM_STUDY = """\
+WITH_HELPER_STUDY = """\
 preset = "tang2014"
 [shapes]
 vertices = [1]
@@ -425,32 +423,32 @@ strength = "1 nN"
 """
 
 
-@pytest.mark.parametrize("edited", [("FIRST = 1.0", "FIRST = 2.0"), ("2.0 * x", "3.0 * x")])
-def test_an_enum_and_a_helper_that_are_edited_make_it_another_study(tmp_path, own_module, edited):
+@pytest.mark.parametrize("edited", [("FACTOR = 1.0", "FACTOR = 2.0"), ("2.0 * x", "3.0 * x")])
+def test_a_number_or_a_helper_that_is_edited_makes_it_another_study(tmp_path, own_module, edited):
     found = []
     for old, new in (("", ""), edited):
-        own_module.write_text(WITH_ENUM.format("njit").replace(old, new))
-        found.append(identity_of(Study(load_text(tmp_path, WITH_ENUM_STUDY))))
+        own_module.write_text(WITH_HELPER.format("njit").replace(old, new))
+        found.append(identity_of(Study(load_text(tmp_path, WITH_HELPER_STUDY))))
     assert "the compiled code for spheres has changed" in differences(*found)[0]
 
 
 def test_a_helper_that_no_hash_follows_is_refused_with_its_force_before_anything_runs(
     tmp_path, own_module
 ):
-    own_module.write_text(WITH_ENUM.format("vectorize(['f8(f8)'])"))
+    own_module.write_text(WITH_HELPER.format("vectorize(['f8(f8)'])"))
     said = (
         r"^Mine: kernel Mine.kernel \(.*own\.py:\d+\) reads the global 'doubled', a DUFunc, whose"
     )
     with pytest.raises(KernelError, match=said):
-        check_study(load_text(tmp_path, WITH_ENUM_STUDY))
+        check_study(load_text(tmp_path, WITH_HELPER_STUDY))
 
 
 def test_a_parameter_that_is_another_each_time_is_refused(tmp_path, own_module):
-    text = WITH_ENUM.format("njit").replace("def kernel(pair, strength)", "def kernel(pair, now)")
+    text = WITH_HELPER.format("njit").replace("def kernel(pair, strength)", "def kernel(pair, now)")
     text = text.replace("doubled(strength)", "doubled(now)")
     own_module.write_text(
         text + "\n    @property\n    def now(self):\n        import time\n\n"
         "        return float(time.perf_counter_ns())\n"
     )
     with pytest.raises(KernelError, match=r"Mine: kernel .* asks for 'now', which is .* once and"):
-        check_study(load_text(tmp_path, WITH_ENUM_STUDY))
+        check_study(load_text(tmp_path, WITH_HELPER_STUDY))
