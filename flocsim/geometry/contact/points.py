@@ -27,16 +27,13 @@ from itertools import combinations, product
 import numpy as np
 
 from flocsim.compiler.linker import apart
-from flocsim.constants import DEEPEST_OVERLAP
+from flocsim.constants import DEEPEST_OVERLAP, TINY
 from flocsim.geometry.shapes.cores import Part, closest_share, edges_of, from_edges
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import hook
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.work import NOW
-
-LEAST_DISTANCE = 1e-300
-"""Lower bound of a distance in a reciprocal [m]."""
 
 ANGLES_PER_RADIAN = 64.0
 """Stored angles per radian: |δ| ≤ 1/128, for which the short series below suffice."""
@@ -196,7 +193,7 @@ def locate_polygons(scene, work, state, row):
     gap = distance - radius_a - radius_b
     # An interior foot moves along the edge with the vertex; an end stays, and the normal turns
     # about it.
-    turning = 0.0 if 0.0 < share < 1.0 else 1.0 / max(distance, LEAST_DISTANCE)
+    turning = 0.0 if 0.0 < share < 1.0 else 1.0 / max(distance, TINY)
     # Position along the edge, for the tangential displacement (integrators/rhs/friction.rolled).
     foot = share * length_of(ex - sx, ey - sy)
     side = 1.0 if (ey - sy) * nx - (ex - sx) * ny >= 0.0 else -1.0
@@ -213,7 +210,7 @@ def locate_spheres(scene, work, state, row):
     contact_distance = 0.5 * (distance + scene.bodies[b].radius - scene.bodies[a].radius)
     gap = distance - scene.bodies[a].radius - scene.bodies[b].radius
     bx, by = contact_distance * nx, contact_distance * ny
-    turning = 1.0 / max(distance, LEAST_DISTANCE)
+    turning = 1.0 / max(distance, TINY)
     store_geometry(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning, 0.0, 1.0)
 
 

@@ -27,7 +27,7 @@ from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.elimination import solve_blocks
 from flocsim.integrators.radau.systems import factorise_euler
 from flocsim.integrators.radau.tableau import REAL
-from flocsim.integrators.rhs.error import end_of_run, rounding_error
+from flocsim.integrators.rhs.error import ITERATION_TOLERANCE, end_of_run, rounding_error
 from flocsim.integrators.rhs.forces import copy_motion, sum_other_forces
 from flocsim.integrators.rhs.jacobian import assemble_without_contacts
 from flocsim.integrators.rhs.surface_gap import flag_near
@@ -35,10 +35,6 @@ from flocsim.integrators.rhs.views import inertia, lever
 from flocsim.state.bodies import X, Y
 from flocsim.state.contacts import CLOSED, OPEN
 from flocsim.state.work import CHANGE, NEW, NOW, START, TRIAL
-
-NEWTON_TOLERANCE = 0.01
-"""Error that Newton's method may leave, as a fraction of the tolerance; and the least gap within
-which the tangential force of an opening contact falls to half."""
 
 MAX_ITERATIONS = 8
 """Iterations after which the active sets are taken to be unknown."""
@@ -50,7 +46,7 @@ def begin_step(work, clock):
     for row in range(work.tally.candidates):
         work.geometry[TRIAL, row] = work.geometry[NOW, row]
         work.candidates[row].contact_mode = OPEN
-        least = NEWTON_TOLERANCE * clock.tolerance
+        least = ITERATION_TOLERANCE * clock.tolerance
         work.interior[row].fade_length = max(-work.geometry[NOW, row].gap, least)
 
 
@@ -202,7 +198,7 @@ def apply_change(work):
 def final_tolerance(scene, work, clock, step):
     """Return the largest displacement of a last change [m]: a fraction of the tolerance, or
     rounding."""
-    return max(NEWTON_TOLERANCE * clock.tolerance, rounding_error(scene, work, NOW, step))
+    return max(ITERATION_TOLERANCE * clock.tolerance, rounding_error(scene, work, NOW, step))
 
 
 @apart

@@ -27,10 +27,6 @@ from flocsim.state.clock import SERIES
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import NEW, NOW, TRIAL
 
-NEVER = 2.0
-"""The fraction of the step at which a switch happens that does not happen in it: anything above
-1."""
-
 MOST_ITERATIONS = 60
 """Evaluations in the search for one switch."""
 
@@ -131,10 +127,10 @@ def share_of_dip(scene, work, step, row, level):
     """Return the fraction of the step at which the margin is least, and locate the pair there in
     TRIAL.
 
-    NEVER if no minimum lies inside the step, or if it cannot be below ``level`` [m].
+    inf if no minimum lies inside the step, or if it cannot be below ``level`` [m].
     """
     if not may_dip_below(work, step, row, level):
-        return NEVER
+        return math.inf
     rates = margin_rate(work, NOW, row), margin_rate(work, NEW, row)
     return share_of_minimum(scene, work, step, row, 0.0, 1.0, rates[0], rates[1])
 
@@ -268,12 +264,12 @@ def changes_sides(work):
 
 
 def first_switch(scene, work, step, resolution, depth):
-    """Return the fraction of the step at which the first mode must change; NEVER if none has to.
+    """Return the fraction of the step at which the first mode must change; inf if none has to.
 
     Expects the geometry of NOW and of NEW. A violation by less than ``depth`` [m] does not count;
     one that counts is located to ``resolution`` [m].
     """
-    earliest, before, shift, end_shift = NEVER, -1, 0.0, 0.0
+    earliest, before, shift, end_shift = math.inf, -1, 0.0, 0.0
     for row in range(work.tally.candidates):
         pair = work.candidates[row].pair
         # Bounds of the displacement from either end to the middle of the step, the same for all

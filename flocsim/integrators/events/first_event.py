@@ -12,7 +12,7 @@ import math
 from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.hooks import SLIP_LIMIT, awaits_touch, contact_event, has
-from flocsim.integrators.events.crossings import NEVER, first_switch
+from flocsim.integrators.events.crossings import first_switch
 from flocsim.integrators.events.grazes import START_FRACTION, grazing_end_share
 from flocsim.integrators.events.resolution import OVERLAP_FRACTION
 from flocsim.integrators.rhs.error import at_least_rounding, step_tolerance
@@ -55,7 +55,7 @@ def kink_share(scene, work, row, which):
     """Return the fraction of the step at which one contact passes one kink, by linear
     interpolation.
 
-    2.0 if it does not, or is as good as there at either end.
+    inf if it does not, or is as good as there at either end.
     """
     view = contact_view(scene, work, NOW, row)
     before = contact_event(scene, view, which)
@@ -65,7 +65,7 @@ def kink_share(scene, work, row, which):
     at_rest = contact_event(scene, view_without_slip(view, view.overlap, 0.0), which)
     negligible = max(KINK_FINENESS * further, KINK_ROUNDING * abs(at_rest))
     if before * after >= 0.0 or nearer <= negligible:
-        return 2.0
+        return math.inf
     # Aim past the kink, so that the next step begins behind it.
     return (1.0 + 0.5 * KINK_FINENESS) * before / (before - after)
 
@@ -76,7 +76,7 @@ def first_law_share(scene, work, clock, step):
 
     Above 1 if none does. Expects the geometry of all pairs in NEW.
     """
-    share, (resolution, _) = NEVER, switch_resolutions(work, clock)
+    share, (resolution, _) = math.inf, switch_resolutions(work, clock)
     for row in range(work.tally.candidates):
         mode = work.candidates[row].contact_mode
         if mode == GRAZING:

@@ -15,8 +15,7 @@ from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.candidates import SAME_POINT
 from flocsim.geometry.contact.points import contact_point, length_of
 from flocsim.hooks import contact_derivatives, contact_force
-from flocsim.integrators.events.crossings import NEVER
-from flocsim.integrators.rhs.error import at_least_rounding
+from flocsim.integrators.rhs.error import NEGLIGIBLE, at_least_rounding
 from flocsim.integrators.rhs.friction import (
     GRAZING_STIFFNESS_RATIO,
     gap_responses,
@@ -32,20 +31,13 @@ from flocsim.integrators.rhs.views import (
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import NEW, NOW
 
-FLIGHT_HEIGHT = 0.1
-"""A chattering pair grazes if its speed would lift it by less than this fraction of the
-tolerance."""
-
 FIRST_FLIGHT_HEIGHT, FIRST_RELEASE = 1e-3, 30.0
-"""The same for a pair that does not chatter yet; and the largest displacement, in tolerances, by
-the speed that its tangential spring releases."""
+"""A pair that does not chatter yet grazes if its speed would lift it by less than this fraction of
+the tolerance, a chattering one by less than NEGLIGIBLE of it; and the largest displacement, in
+tolerances, by the speed that its tangential spring releases."""
 
 CHATTER_COUNT = 5
-"""A pair chatters after this many flights in a row of no more than FLIGHT_HEIGHT."""
-
-LATE_EFFECT = 0.1
-"""A step may pass the end of grazing if that displaces bodies by less than this fraction of the
-tolerance; the force passes through zero there."""
+"""A pair chatters after this many flights in a row of no more than NEGLIGIBLE."""
 
 START_FRACTION = 0.02
 """Grazing that ends within this fraction of a step ends at its start; a step that may not pass the
@@ -65,7 +57,7 @@ def begins_grazing(scene, work, clock, row):
     _, force = contact_force(scene, view)
     _, by_tangential = gap_responses(scene, work, row)
     speed, pull = normal_rate(work, NOW, row), abs(force * by_tangential)
-    share = FLIGHT_HEIGHT if chatters(work, row) else FIRST_FLIGHT_HEIGHT
+    share = NEGLIGIBLE if chatters(work, row) else FIRST_FLIGHT_HEIGHT
     if speed * speed > 2.0 * pull * share * clock.tolerance:
         return False
     # A normal force that acts without overlap, such as cohesion, holds or opens the pair by itself.
@@ -222,7 +214,7 @@ def count_short_flight(work, clock, step, row):
     flight = contact.flight_gap
     if flight == 0.0:
         flight = 0.25 * step * abs(normal_rate(work, NOW, row))
-    if flight > FLIGHT_HEIGHT * clock.tolerance:
+    if flight > NEGLIGIBLE * clock.tolerance:
         contact.short_flights = 0.0
     elif flight > 0.0:
         contact.short_flights += 1.0
@@ -235,7 +227,7 @@ def track_flight(work, clock, row):
     contact = work.contacts[row]
     flight = max(contact.flight_gap, work.geometry[NOW, row].gap)
     contact.flight_gap = flight
-    if flight > FLIGHT_HEIGHT * clock.tolerance:
+    if flight > NEGLIGIBLE * clock.tolerance:
         contact.short_flights = 0.0
 
 
@@ -286,24 +278,25 @@ def grazing_end_share(work, clock, step, row):
     """Return the fraction of the step at which a pair ceases to graze.
 
     That is where T passes through zero or the pair ceases to slide; both are interpolated linearly.
-    Above 1 if it does not happen, or matters little.
+    inf if it does not happen, or matters little: a step may pass the end of grazing if that
+    displaces bodies by less than NEGLIGIBLE of the tolerance, as the force is zero there.
     """
     contact = work.contacts[row]
     resistance = abs(contact.grazing_resistance)
     if resistance == 0.0:
-        return NEVER
+        return math.inf
     before, after = contact.grazing_force, final_force(work, row)
     # Displacement of the gap per unit force, in the step and later.
     lever = GRAZING_STIFFNESS_RATIO / resistance * (step + velocity_lifetime_of(work, row))
-    if abs(after) * lever < LATE_EFFECT * clock.tolerance:
-        return NEVER
+    if abs(after) * lever < NEGLIGIBLE * clock.tolerance:
+        return math.inf
     # Zero of T.
-    share = before / (before - after) if before * after < 0.0 else NEVER
+    share = before / (before - after) if before * after < 0.0 else math.inf
     # Zero of the sliding speed, counted against T.
     side = 1.0 if before > 0.0 else -1.0
     start_speed = -side * tangential_rate(work, NOW, row)
     end_speed = -side * tangential_rate(work, NEW, row)
-    if contact.newly_grazing != 0.0 and -end_speed * step > LATE_EFFECT * clock.tolerance:
+    if contact.newly_grazing != 0.0 and -end_speed * step > NEGLIGIBLE * clock.tolerance:
         # It may have stuck before, and parted by rounding.
         start_speed = max(start_speed, 0.0)
     if start_speed >= 0.0 > end_speed:

@@ -33,7 +33,11 @@ from flocsim.integrators.radau.stages import (
     locate_state,
     update_stage_slips,
 )
-from flocsim.integrators.rhs.error import rounding_error, step_tolerance
+from flocsim.integrators.rhs.error import (
+    ITERATION_TOLERANCE,
+    rounding_error,
+    step_tolerance,
+)
 from flocsim.integrators.rhs.forces import adopt_stage, copy_motion, sum_forces
 from flocsim.integrators.rhs.views import inertia, lever
 from flocsim.state.work import (
@@ -67,10 +71,6 @@ MATRIX = (
 
 MAX_ITERATIONS = 6
 """Iterations before the step is left to Radau IIA."""
-
-ITERATION_TOLERANCE = 1e-2
-"""Error that the iteration may leave, as a fraction of the step's tolerance. With .05 the errors of
-consecutive steps have one sign, and runs become ten times less accurate."""
 
 NO_SWING_PHASE = 1.0
 """Phase h ω [rad] of the fastest vibration below which nothing oscillates in a step: its path has

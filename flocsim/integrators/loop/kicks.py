@@ -21,6 +21,7 @@ Source: Salmon, Moraes, Dror and Shaw (2011), Parallel random numbers: as easy a
 import math
 
 from flocsim.geometry.contact.points import length_of, separation
+from flocsim.integrators.rhs.error import ROUNDING
 from flocsim.state.work import NOW
 
 KICK, HALVINGS, SPREAD, LEAST_DISPLACEMENT = range(4)
@@ -32,8 +33,8 @@ SHARE_OF_GAP = 0.25
 """Largest relative displacement of two bodies in a kick (rms), as a fraction of the gap between
 them."""
 
-SAME_TIME, ROUNDED = 1e-9, 1e-15
-"""Tolerances for "the step ended with the kick", relative to the kick and to the time."""
+SAME_TIME = 1e-9
+"""Tolerance for "the step ended with the kick", relative to the kick; to the time: ROUNDING."""
 
 
 def has_kicks(scene):
@@ -58,7 +59,7 @@ def snap_to_kick_end(scene, work, clock):
     if has_kicks(scene):
         end = kick_end(scene, work)
         near = SAME_TIME * work.kick.duration * finest_kick(scene)
-        if abs(clock.time - end) <= max(near, ROUNDED * clock.time):
+        if abs(clock.time - end) <= max(near, ROUNDING * clock.time):
             clock.time = end
 
 

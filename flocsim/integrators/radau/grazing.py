@@ -10,6 +10,7 @@ second contact holds them.
 
 from flocsim.integrators.radau.systems import solve_prepared
 from flocsim.integrators.radau.tableau import REAL
+from flocsim.integrators.rhs.error import NEGLIGIBLE
 from flocsim.integrators.rhs.friction import GRAZING_STIFFNESS_RATIO
 from flocsim.integrators.rhs.jacobian import normal_rows, tangent_rows
 from flocsim.integrators.rhs.views import normal_rate, velocity_lifetime_of
@@ -19,11 +20,6 @@ from flocsim.state.work import NOW
 LEAST_RESPONSE = 1e-3
 """Smallest normal response, over the tangential response, of a contact that grazes. With less, the
 tangential force cannot lift the contact."""
-
-
-MAX_START_DISPLACEMENT = 0.1
-"""Largest tangential displacement, over the tolerance, by the impulse that stops the opening of a
-contact which begins to graze. With more, it does not begin."""
 
 
 def any_grazes(work):
@@ -65,14 +61,14 @@ def tangential_response(scene, work, row):
 
 def can_begin_grazing(work, clock, row, lifting, sliding):
     """Return True if the force of a contact that just opened lifts it, and can stop the opening
-    gently.
+    gently: a tangential displacement by that impulse of at most NEGLIGIBLE of the tolerance.
 
     ``lifting`` and ``sliding`` are its tangential_response.
     """
     if lifting * work.contacts[row].grazing_force <= 0.0:
         return False
     displacement = abs(sliding * normal_rate(work, NOW, row)) * velocity_lifetime_of(work, row)
-    return displacement <= MAX_START_DISPLACEMENT * clock.tolerance * abs(lifting)
+    return displacement <= NEGLIGIBLE * clock.tolerance * abs(lifting)
 
 
 def set_grazing_resistances(scene, work, clock):

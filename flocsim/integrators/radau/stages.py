@@ -18,7 +18,13 @@ from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import update_frames
 from flocsim.integrators.radau.systems import solve_both, write_residuals, write_stage_changes
 from flocsim.integrators.radau.tableau import MATRIX, NODES, SECOND_STAGE, THIRD_STAGE
-from flocsim.integrators.rhs.error import at_least_rounding, rounding_error, step_tolerance
+from flocsim.integrators.rhs.error import (
+    ITERATION_TOLERANCE,
+    NEGLIGIBLE,
+    at_least_rounding,
+    rounding_error,
+    step_tolerance,
+)
 from flocsim.integrators.rhs.forces import adopt_stage, locate_for_forces, sum_forces
 from flocsim.integrators.rhs.friction import (
     GRAZING_STIFFNESS_RATIO,
@@ -39,28 +45,25 @@ ASSUMED_RATE = 0.5
 """Convergence rate assumed for the first iteration where no earlier step has shown one; upper bound
 of the extrapolated rate."""
 
-NEWTON_TOLERANCE, FREE_NEWTON_TOLERANCE = 1e-3, 1e-2
-"""Error that Newton's method may leave, as a fraction of the step's tolerance; the second value
-holds where no body is near another, since the tolerance is a hundred times smaller there. With .01
+NEWTON_TOLERANCE = 1e-3
+"""Error that Newton's method may leave, as a fraction of the step's tolerance; ITERATION_TOLERANCE
+where no body is near another, since the tolerance is a hundred times smaller there. With .01
 in contact, too, runs took 5 % less time, but errors of rolling and departing pairs were two to
 three times as large."""
 
 RATE_SAFETY = 3.0
 """Safety factor on the Newton convergence rate extrapolated from the previous step (rate ∝ h²)."""
 
-OVERLAP_TOLERANCE = 2e-3
-"""Relative tolerance of overlaps in Newton's method. Overlaps carry the loads, however far below
-the tolerance of positions they are. Without this, rounding in them was taken for an error of the
-step, and cost 20 times the steps."""
+GAP_TOLERANCE = 2e-3
+"""Tolerance of gaps in Newton's method: relative to overlaps, which carry the loads, however far
+below the tolerance of positions they are (without this, rounding in them was taken for an error of
+the step, and cost 20 times the steps); with a surface force, relative to the smoothing length over
+which it passes from one feature pair to the next (rhs/surface_gap.py): larger errors shake bodies
+that lie flat in an energy well."""
 
-SURFACE_GAP_TOLERANCE = 2e-3
-"""Tolerance of gaps with a surface force, as a fraction of the smoothing length over which the
-force passes from one feature pair to the next (rhs/surface_gap.py). Larger errors shake bodies that
-lie flat in an energy well."""
-
-GRAZING_TOLERANCE, NEGLIGIBLE_EFFECT = 0.02, 0.1
-"""Relative tolerance of the tangential forces of grazing contacts; and the displacement by such a
-force, as a fraction of the tolerance of positions, below which its error is ignored."""
+GRAZING_TOLERANCE = 0.02
+"""Relative tolerance of the tangential forces of grazing contacts; errors whose displacement is
+NEGLIGIBLE are ignored."""
 
 SMALLEST_RATE = 1e-3
 """Lower bound of the extrapolated convergence rate. Where it decides, an unneeded second iteration
@@ -142,7 +145,7 @@ def change_of_contacts(scene, work, step, stage, goal):
         if candidate.contact_mode == CLOSED:
             change = step * abs(normal_component(work, row, work.velocity, CHANGE, NOW))
             overlap = abs(geometry.gap)
-            allowed = max(OVERLAP_TOLERANCE * overlap, 0.1 * least)
+            allowed = max(GAP_TOLERANCE * overlap, 0.1 * least)
             largest = max(largest, goal * change / allowed)
         elif candidate.contact_mode == GRAZING:
             # Grazing contact: relative tolerance of its tangential force, which is a dashpot's.
@@ -154,13 +157,13 @@ def change_of_contacts(scene, work, step, stage, goal):
             force = abs(grazing_force(work, state, row))
             # A force that moves nothing by more than a share of the goal does not count.
             lever = GRAZING_STIFFNESS_RATIO / max(abs(resistance), TINY) * (step + memory)
-            allowed = max(GRAZING_TOLERANCE * force, NEGLIGIBLE_EFFECT * goal / max(lever, TINY))
+            allowed = max(GRAZING_TOLERANCE * force, NEGLIGIBLE * goal / max(lever, TINY))
             largest = max(largest, goal * change / allowed)
         elif candidate.surface_active == 1 and geometry.force_share > 0.0:
             # Surface force: fraction of its smoothing length.
             change = step * abs(normal_component(work, row, work.velocity, CHANGE, NOW))
             length = smoothing_length(scene, geometry.gap)
-            allowed = max(SURFACE_GAP_TOLERANCE * length, 0.1 * least)
+            allowed = max(GAP_TOLERANCE * length, 0.1 * least)
             largest = max(largest, goal * change / allowed)
     return largest
 
@@ -225,7 +228,7 @@ def solve_stages(scene, work, clock, step):
     predicted = expected_rate(clock, step)
     # Positions are solved to a fraction of the tolerance, but not below rounding.
     allowed = step_tolerance(work, clock)
-    fraction = NEWTON_TOLERANCE if allowed == clock.tolerance else FREE_NEWTON_TOLERANCE
+    fraction = NEWTON_TOLERANCE if allowed == clock.tolerance else ITERATION_TOLERANCE
     # Rotation of the contacts makes every other iteration converge worse. So the rate is the
     # geometric mean of two iterations.
     previous, earlier = math.inf, math.inf

@@ -25,6 +25,13 @@ COARSEST_ROUNDING = 2e-15
 """Limit of any resolution, as a fraction of the coordinates: ten neighbouring floating-point
 numbers."""
 
+ITERATION_TOLERANCE = 0.01
+"""Error that iterations for the end of a step may leave, as a fraction of the tolerance. With .05
+the errors of consecutive series have one sign, and runs become ten times less accurate."""
+
+NEGLIGIBLE = 0.1
+"""Displacement, as a fraction of the tolerance, that contacts which graze may cause unnoticed."""
+
 FREE_MOTION_FRACTION = 0.01
 """Fraction of the tolerance allowed while no gap is below it. Free motion is cheap to follow, and
 the outcome of the encounter that it leads to depends on nanometres."""

@@ -15,12 +15,9 @@ from flocsim.state.bodies import ANGLE
 from flocsim.state.views import OrientedView
 from flocsim.state.work import NOW
 
-ANGLE_DIFFERENCE = 1e-4
-"""Difference step of angles [rad]; the error of a central difference is of the order of its
-square."""
-
-DISTANCE_DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-12
-"""Difference step of the distance: a fraction of the gap, and a lower bound [m]."""
+DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-12
+"""Difference step of angles [rad], and of the distance as a fraction of the gap; lower bound of the
+latter [m]. The error of a central difference is of the order of its square."""
 
 
 def oriented_view(scene, time, j, i, distance, angle_i, angle_j):
@@ -61,15 +58,15 @@ def oriented_forces_at(scene, time, j, i, x, y, angle_j, angle_i):
     distance, one, other = view.centre_distance, view.angle_i, view.angle_j
     if distance == 0.0:
         return 0.0, 0.0, 0.0, 0.0
-    by = DISTANCE_DIFFERENCE * abs(view.gap) + LEAST_DIFFERENCE
+    by = DIFFERENCE * abs(view.gap) + LEAST_DIFFERENCE
     # −∂U/∂d, −∂U/∂α_i and −∂U/∂α_j.
     rise = energy_at(scene, time, j, i, distance + by, one, other)
     rise -= energy_at(scene, time, j, i, distance - by, one, other)
-    of_i = energy_at(scene, time, j, i, distance, one + ANGLE_DIFFERENCE, other)
-    of_i -= energy_at(scene, time, j, i, distance, one - ANGLE_DIFFERENCE, other)
-    of_j = energy_at(scene, time, j, i, distance, one, other + ANGLE_DIFFERENCE)
-    of_j -= energy_at(scene, time, j, i, distance, one, other - ANGLE_DIFFERENCE)
-    along, torques = -0.5 * rise / by, -0.5 / ANGLE_DIFFERENCE
+    of_i = energy_at(scene, time, j, i, distance, one + DIFFERENCE, other)
+    of_i -= energy_at(scene, time, j, i, distance, one - DIFFERENCE, other)
+    of_j = energy_at(scene, time, j, i, distance, one, other + DIFFERENCE)
+    of_j -= energy_at(scene, time, j, i, distance, one, other - DIFFERENCE)
+    along, torques = -0.5 * rise / by, -0.5 / DIFFERENCE
     torque_i, torque_j = torques * of_i, torques * of_j
     # Balance of torques about i.
     across = -(torque_i + torque_j) / distance
