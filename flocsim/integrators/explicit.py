@@ -19,7 +19,7 @@ from flocsim.integrators.parts import (
 )
 from flocsim.integrators.rhs.error import end_of_run, error_ratio
 from flocsim.integrators.rhs.forces import adopt_stage, locate_with_slip_rates, sum_forces
-from flocsim.integrators.rhs.friction import slip_in
+from flocsim.integrators.rhs.friction import limited_slip
 from flocsim.integrators.rhs.jacobian import weigh_velocities
 from flocsim.state.contacts import CLOSED
 from flocsim.state.work import FIRST_STAGE, NEW, NOW, STEP_ERROR
@@ -76,7 +76,9 @@ def combine_slips(scene, work, weights, stages, step, end):
             for stage in range(stages):
                 total += weights[stage] * work.slip_rate[state_of(stage), row]
             # A contact that slides stays at its limit.
-            work.slip[end, row] = slip_in(scene, work, end, row, work.slip[NOW, row] + step * total)
+            work.slip[end, row] = limited_slip(
+                scene, work, end, row, work.slip[NOW, row] + step * total
+            )
 
 
 def evaluate_stages(scene, work, time, step):

@@ -194,7 +194,7 @@ def locate_polygons(scene, work, state, row):
     # An interior foot moves along the edge with the vertex; an end stays, and the normal turns
     # about it.
     turning = 0.0 if 0.0 < share < 1.0 else 1.0 / max(distance, TINY)
-    # Position along the edge, for the tangential displacement (integrators/rhs/friction.rolled).
+    # Position along the edge, for the tangential displacement (rhs/friction.slip_of_motion).
     foot = share * length_of(ex - sx, ey - sy)
     side = 1.0 if (ey - sy) * nx - (ex - sx) * ny >= 0.0 else -1.0
     store_geometry(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning, foot, side)

@@ -28,7 +28,7 @@ from flocsim.integrators.radau.elimination import solve_blocks
 from flocsim.integrators.radau.systems import factorise_euler
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.error import ITERATION_TOLERANCE, end_of_run, rounding_error
-from flocsim.integrators.rhs.forces import copy_motion, sum_other_forces
+from flocsim.integrators.rhs.forces import copy_motion, sum_forces_without_contacts
 from flocsim.integrators.rhs.jacobian import assemble_without_contacts
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, lever
@@ -74,7 +74,7 @@ def evaluate_other_forces(scene, work, time, step):
     locate_contacts(scene, work, NOW)
     if scene.surface_reach > 0.0:
         flag_near(scene, work, NOW, 0.0)
-    sum_other_forces(scene, work, time + step, NOW)
+    sum_forces_without_contacts(scene, work, time + step, NOW)
 
 
 def evaluate_included(scene, work, time, step):
@@ -87,7 +87,7 @@ def evaluate_included(scene, work, time, step):
         return
     update_positions(work, step)
     locate_acting(scene, work, NOW)
-    sum_other_forces(scene, work, time + step, NOW)
+    sum_forces_without_contacts(scene, work, time + step, NOW)
 
 
 def evaluate_end(scene, work, time, step):

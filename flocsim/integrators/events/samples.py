@@ -18,7 +18,7 @@ from flocsim.integrators.events.crossings import (
 )
 from flocsim.integrators.events.interpolation import end_within, interpolate
 from flocsim.integrators.exponential.collocation import NODES
-from flocsim.integrators.rhs.friction import excess_slip_rate, rolled, slip_limit_at
+from flocsim.integrators.rhs.friction import excess_slip_rate, slip_limit_at, slip_of_motion
 from flocsim.integrators.rhs.views import contact_view
 from flocsim.state.contacts import CLOSED, OPEN
 from flocsim.state.work import FIRST_STAGE, NEW, NOW, TRIAL
@@ -59,7 +59,7 @@ def has_changed_friction(scene, work, row, resolution):
     """Return True if a closed pair has begun or ceased to slide, or passed a kink of its law, in
     TRIAL."""
     if has(scene, SLIP_LIMIT):
-        work.slip[TRIAL, row] = work.slip[NOW, row] + rolled(scene, work, TRIAL, row)
+        work.slip[TRIAL, row] = work.slip[NOW, row] + slip_of_motion(scene, work, TRIAL, row)
         # A sticking pair slides beyond its limit; a sliding one sticks where it would fall below.
         side = work.candidates[row].slide_direction
         if side == 0:
@@ -126,7 +126,7 @@ def parts_by_displacement(scene, work, step):
     return parts
 
 
-def cut(scene, work, clock, step, resolution, depth):
+def cut_series(scene, work, clock, step, resolution, depth):
     """Cut a series step at the first sample that shows an event; return the fraction that
     remains."""
     fraction = 1.0

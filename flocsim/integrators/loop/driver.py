@@ -5,8 +5,9 @@ One pass of `advance` tries one step:
  1. Renew the candidate lists if half of their motion budget is spent.
  2. Choose the step; let the method attempt it. A ratio (error over tolerance) above 1, or a
     failure (below 0), rejects it.
- 3. Locate all pairs at its end. If a contact opens, closes, sticks or slides inside the step, the
-    step is ended there (event location), since forces are smooth only while modes are fixed.
+ 3. Compute the geometry of all pairs at its end. If a contact opens, closes, sticks or slides
+    inside the step, the step is ended there (event location), since forces are smooth only while
+    modes are fixed.
  4. Accept: NEW becomes NOW, errors are propagated, contact modes are set.
  5. Plan the next step, record the state, ask the observer.
 
@@ -46,7 +47,7 @@ from flocsim.integrators.events.first_event import (
 )
 from flocsim.integrators.events.grazes import end_grazing_early, update_grazing_pairs
 from flocsim.integrators.events.interpolation import end_within
-from flocsim.integrators.events.samples import cut
+from flocsim.integrators.events.samples import cut_series
 from flocsim.integrators.loop.kicks import renew_kicks, snap_to_kick_end
 from flocsim.integrators.loop.stated_error import (
     add_switch_errors,
@@ -62,7 +63,7 @@ from flocsim.integrators.loop.step_size import (
     step_to_switch,
 )
 from flocsim.integrators.rhs.forces import copy_motion
-from flocsim.integrators.rhs.friction import rolled, slip_in, slip_rate_of_gap_change
+from flocsim.integrators.rhs.friction import limited_slip, slip_of_motion, slip_rate_of_gap_change
 from flocsim.integrators.rhs.surface_gap import flag_near, missed_sharing
 from flocsim.state.bodies import RECORD_MOTION, RECORD_TIME
 from flocsim.state.clock import NOTHING_FULL, PLAIN, SERIES
@@ -93,7 +94,7 @@ def adopt_new_state(work):
 
 
 @apart
-def accept(scene, work, clock, counts, step, lists):
+def accept(scene, work, clock, counts, step, needs_lists):
     """Accept the step: adopt the new state, propagate errors and set the modes of all pairs. Return
     True if a contact has switched."""
     adopt_new_state(work)
@@ -106,7 +107,7 @@ def accept(scene, work, clock, counts, step, lists):
         propagate_errors(scene, work, clock, step)
     if across:
         note_rates(work, clock, step)
-    if not lists:
+    if not needs_lists:
         return False
     if controlled and has(scene, CONTACT_FORCE):
         # Steps across switches locate none, so they have no such errors.
@@ -207,8 +208,10 @@ def update_slips(scene, work, step):
             # ξ follows from positions; only the part by the change of the gap is integrated
             # (trapezoid).
             gap_change_slip = 0.5 * step * slip_rate_of_gap_change(scene, work, NEW, row)
-            sticking_slip = work.slip[NOW, row] + rolled(scene, work, NEW, row) + gap_change_slip
-            work.slip[NEW, row] = slip_in(scene, work, NEW, row, sticking_slip)
+            sticking_slip = (
+                work.slip[NOW, row] + slip_of_motion(scene, work, NEW, row) + gap_change_slip
+            )
+            work.slip[NEW, row] = limited_slip(scene, work, NEW, row, sticking_slip)
 
 
 def ends_early(scene, work, clock, step, ratio, share):
@@ -227,11 +230,11 @@ def ends_early(scene, work, clock, step, ratio, share):
     return not may_switch(scene, work, share * step, resolution, depth)
 
 
-def record_and_observe(scene, work, observed, clock, counts, record, lists):
+def record_and_observe(scene, work, observed, clock, counts, record, needs_lists):
     """Record the accepted state and show it to the observer. Return a Status, or 0 to continue."""
     if record.shape[0] > 0:
         record_row(work, clock, counts, record)
-    if lists and any_too_deep(scene, work, NOW):
+    if needs_lists and any_too_deep(scene, work, NOW):
         return TOO_DEEP
     counts.code = observe(scene, work, observed, clock.time)
     return STOPPED if counts.code != 0 else 0
@@ -245,8 +248,8 @@ def advance(scene, work, observed, clock, counts, record):
     records nothing. ``observed`` is the observer's own array.
     """
     # Forces at the outline need lists; so do centre forces if not all pairs are watched.
-    lists = has(scene, CONTACT_FORCE) or scene.listed_reach > 0.0
-    lists = lists or (has(scene, CENTRE_FORCE) and not lists_all_pairs(work))
+    needs_lists = has(scene, CONTACT_FORCE) or scene.listed_reach > 0.0
+    needs_lists = needs_lists or (has(scene, CENTRE_FORCE) and not lists_all_pairs(work))
     # The bound of the next trial [s], and the trials spent on the current switch.
     limit, trials = math.inf, 0
     while clock.time < clock.until:
@@ -254,12 +257,12 @@ def advance(scene, work, observed, clock, counts, record):
         if status != 0:
             return status
         # 1. Lists. A repeated trial starts from the same state: its lists are valid.
-        if lists and trials == 0 and not keep_lists(scene, work, clock.step):
+        if needs_lists and trials == 0 and not keep_lists(scene, work, clock.step):
             return NO_ROOM
         # 2. Attempt a step.
         hand_over(scene, work, clock, counts)
         renew_kicks(scene, work, clock)
-        step = representable_step(clock, min(choose_step(scene, work, clock, lists), limit))
+        step = representable_step(clock, min(choose_step(scene, work, clock, needs_lists), limit))
         # Pairs that may share a surface force are fixed for the step, so that it stays smooth.
         if scene.listed_reach > 0.0:
             flag_near(scene, work, NOW, step)
@@ -269,29 +272,29 @@ def advance(scene, work, observed, clock, counts, record):
         if ratio < 0.0 and clock.tolerance == math.inf:
             return NOT_FINITE
         # Reject: the error is too large, Newton failed, or the bodies moved out of the lists.
-        too_far = lists and 0.0 <= ratio <= 1.0 and went_too_far(scene, work, clock, step)
+        too_far = needs_lists and 0.0 <= ratio <= 1.0 and went_too_far(scene, work, clock, step)
         if ratio < 0.0 or ratio > 1.0 or too_far:
             limit, trials = math.inf, 0
             if not reject(clock, counts, step, ratio, too_far):
                 return STALLED
             continue
         # 3. Events. Grazing that ends right at the start: begin again in the other mode.
-        if lists and trials < MOST_TRIALS and end_grazing_early(scene, work, clock, step):
+        if needs_lists and trials < MOST_TRIALS and end_grazing_early(scene, work, clock, step):
             counts.located += 1
             trials += 1
             clock.stages_step = 0.0
             continue
         # A series may span several swings of a contact: cut it at the first switch seen.
-        if lists and trials < MOST_TRIALS and work.tally.kind == SERIES:
+        if needs_lists and trials < MOST_TRIALS and work.tally.kind == SERIES:
             resolution, depth = switch_resolutions(work, clock)
-            remaining = cut(scene, work, clock, step, resolution, depth)
+            remaining = cut_series(scene, work, clock, step, resolution, depth)
             if remaining < 1.0:
                 step *= remaining
                 trials += 1
                 locate_contacts(scene, work, NEW)
                 update_slips(scene, work, step)
         # Locate the first switch. End the step there by interpolation, else by a shorter step.
-        share = switch_share(scene, work, observed, clock, step) if lists else math.inf
+        share = switch_share(scene, work, observed, clock, step) if needs_lists else math.inf
         if share < 1.0 and trials < MOST_TRIALS:
             trials += 1
             if not ends_early(scene, work, clock, step, ratio, share):
@@ -302,13 +305,13 @@ def advance(scene, work, observed, clock, counts, record):
         # 4. Accept.
         was_flying = work.tally.kind == SERIES and not any_touching(work)
         planned = clock.step
-        switched = accept(scene, work, clock, counts, step, lists)
+        switched = accept(scene, work, clock, counts, step, needs_lists)
         # 5. Plan the next step.
         plan(scene, work, clock, step, ratio, trials > 0, switched)
         if switched and work.tally.kind == SERIES:
             plan_flight(work, clock, planned, was_flying)
         limit, trials = math.inf, 0
-        status = record_and_observe(scene, work, observed, clock, counts, record, lists)
+        status = record_and_observe(scene, work, observed, clock, counts, record, needs_lists)
         if status != 0:
             return status
         if stands_still(clock, counts, step):

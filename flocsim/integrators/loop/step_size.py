@@ -26,7 +26,7 @@ SAFETY = 0.9
 """Fraction of the step at which the error would just meet the tolerance."""
 
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.1, 8.0
-"""Bounds of the change from one step to the next."""
+"""Bounds of the change from one step to the next, but behind a switch (`plan`)."""
 
 
 def adaptive_factor(clock, step, ratio, order):
@@ -96,10 +96,10 @@ def step_to_landing(work, clock, step):
     return step
 
 
-def choose_step(scene, work, clock, lists):
+def choose_step(scene, work, clock, needs_lists):
     step = min(clock.step, clock.largest_step)
     # Lists: no pair may use up its motion budget.
-    if lists:
+    if needs_lists:
         step = min(step, time_to_spend(scene, work, spendable_share(scene, work)))
         # Steps across switches end just before a landing.
         if clock.across == 1.0:
@@ -193,15 +193,15 @@ def step_to_switch(scene, work, step, share):
     return max(share * step, min(0.5 * step, MAX_PHASE / fastest))
 
 
-def plan(scene, work, clock, step, ratio, was_cut, switched):
-    """Plan the size of the step after an accepted one. ``was_cut`` is True if the step was meant to
-    end at a switch, ``switched`` if a contact has switched at its end."""
+def plan(scene, work, clock, step, ratio, aimed_at_switch, switched):
+    """Plan the size of the step after an accepted one. ``aimed_at_switch`` is True if the step was
+    meant to end at a switch, ``switched`` if a contact has switched at its end."""
     if switched:
         # The forces are new.
         clock.previous_step = math.inf
         clock.stages_step = 0.0
         clock.step = min(clock.step, step_behind_touch(scene, work, clock))
-    elif was_cut:
+    elif aimed_at_switch:
         # The switch did not come: the step was too long to predict it. Or it was a kink: then the
         # convergence rate may be that from before it.
         clock.previous_step = math.inf
@@ -210,9 +210,9 @@ def plan(scene, work, clock, step, ratio, was_cut, switched):
         clock.second_iteration_rate = 0.0
     else:
         # A step shortened by lists or stops says nothing about the trend of the error.
-        cut = step < 0.5 * clock.step
+        shortened = step < 0.5 * clock.step
         clock.step = min(next_step(clock, step, ratio), clock.feasible_step)
         clock.feasible_step *= RECOVERY
-        clock.previous_step = math.inf if cut else step
+        clock.previous_step = math.inf if shortened else step
         clock.previous_ratio = ratio
     clock.rejected_step = 0.0

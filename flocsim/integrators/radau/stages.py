@@ -29,8 +29,8 @@ from flocsim.integrators.rhs.forces import adopt_stage, locate_for_forces, sum_f
 from flocsim.integrators.rhs.friction import (
     GRAZING_STIFFNESS_RATIO,
     grazing_force,
-    rolled,
-    slip_in,
+    limited_slip,
+    slip_of_motion,
     slip_rate_of_gap_change,
 )
 from flocsim.integrators.rhs.surface_gap import locate_sharing, smoothing_length
@@ -104,8 +104,10 @@ def update_stage_slips(scene, work, step, first, matrix):
                 mean += two * work.slip_rate[SECOND_STAGE, row]
                 mean += three * work.slip_rate[THIRD_STAGE, row]
                 state = FIRST_STAGE + stage
-                sticking_slip = slip[NOW, row] + rolled(scene, work, state, row) + step * mean
-                slip[state, row] = slip_in(scene, work, state, row, sticking_slip)
+                sticking_slip = (
+                    slip[NOW, row] + slip_of_motion(scene, work, state, row) + step * mean
+                )
+                slip[state, row] = limited_slip(scene, work, state, row, sticking_slip)
 
 
 def locate_state(scene, work, state):

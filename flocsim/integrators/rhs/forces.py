@@ -134,7 +134,7 @@ def locate_with_slip_rates(scene, work, state):
     write_slip_rates(work, state)
 
 
-def sum_other_forces(scene, work, time, state):
+def sum_forces_without_contacts(scene, work, time, state):
     """Sum all forces and torques except contact forces into ``work.force[state]``. Geometry is
     located."""
     work.tally.evaluations += 1
@@ -157,6 +157,6 @@ def sum_other_forces(scene, work, time, state):
 def sum_forces(scene, work, time, state):
     """Sum all forces and torques of a state into ``work.force[state]``. Geometry must be
     located."""
-    sum_other_forces(scene, work, time, state)
+    sum_forces_without_contacts(scene, work, time, state)
     if has(scene, CONTACT_FORCE):
         add_contact_forces(scene, work, state)

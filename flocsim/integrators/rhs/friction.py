@@ -66,7 +66,7 @@ def turn_of_normal(work, state, row):
     return math.atan2(ox * ny - oy * nx, ox * nx + oy * ny)
 
 
-def rolled(scene, work, state, row):
+def slip_of_motion(scene, work, state, row):
     """Return the growth of ξ from now to a state at the present gap [m]; both states are located.
 
     D and r are those of now; see slip_rate_of_gap_change for the rest.
@@ -128,7 +128,7 @@ def excess_slip_rate(scene, work, state, row, side):
     return side * tangential_rate(work, state, row) - growth
 
 
-def slip_in(scene, work, state, row, sticking_slip):
+def limited_slip(scene, work, state, row, sticking_slip):
     """Return ξ of a closed pair in a state [m]: ``sticking_slip`` if it sticks, else its limit."""
     side = work.candidates[row].slide_direction
     if side == 0:

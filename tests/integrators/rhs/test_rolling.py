@@ -9,7 +9,7 @@ from flocsim import Body, Sphere, SpheroPolygon
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.rhs.friction import rolled, slip_rate_of_gap_change
+from flocsim.integrators.rhs.friction import slip_of_motion, slip_rate_of_gap_change
 from flocsim.state.work import FIRST_STAGE, NOW, work_of
 
 LATER = FIRST_STAGE
@@ -35,7 +35,7 @@ def gone(scene, work, places):
     locate_contacts(scene, work, LATER)
     rows = range(work.tally.candidates)
     besides = [0.5 * slip_rate_of_gap_change(scene, work, LATER, row) for row in rows]
-    return np.array([rolled(scene, work, LATER, row) for row in rows]) + besides
+    return np.array([slip_of_motion(scene, work, LATER, row) for row in rows]) + besides
 
 
 @pytest.mark.parametrize("angle", [1e-6, 0.3, -2.0, 3.0])
