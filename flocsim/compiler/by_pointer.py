@@ -40,6 +40,7 @@ def as_plain(value: Any) -> Any:
         raise KernelError(f"a {type(value).__name__} is not alone in its array: take a copy")
     if not array.flags.c_contiguous:
         raise KernelError(f"an array (shape {array.shape}) does not lie in C order")
+    # Bytes will do: they have the same address, and are cleared in the same way.
     return array if array.dtype.names is None else array.view(np.uint8)
 
 
@@ -64,6 +65,7 @@ def keep(value: tuple[Any, ...], owner: Any) -> None:
     """Remember what a tuple is in tables while its owner lives: they are then made in a fraction of
     the time. Its arrays may not be exchanged meanwhile."""
     if id(value) not in KEPT:
+        # The entry holds the tuple itself, so that no other object is given its id meanwhile.
         KEPT[id(value)] = Kept(value, *table_of(value), written(value))
         weakref.finalize(owner, KEPT.pop, id(value), None)
 
@@ -87,6 +89,7 @@ def letter_of(value: Any) -> str:
 def flatten(value, words, kinds):
     """Append an argument to the words of a table, and its type to ``kinds``."""
     if isinstance(value, np.ndarray):
+        # Sizes are words and not part of the type: arrays of any size share machine code.
         words.append(address_of(value))
         words.extend(value.shape)
         kinds.append((value.dtype if value.dtype.names else value.dtype.char, value.ndim))
@@ -102,6 +105,7 @@ def flatten(value, words, kinds):
         for each in value:
             flatten(each, words, kinds)
     else:
+        # What compiled code cannot use takes a word that it never reads.
         letter = letter_of(value)
         words.append(value if letter else 0)
         kinds.append(letter)
@@ -135,5 +139,6 @@ def sizes_of(named: Any) -> dict[str, tuple[int, ...]]:
 def kinds_text(kinds: tuple[Any, ...]) -> str:
     """Return the types of arguments as text that differs where machine code may: with the names of
     fields in their order, and sizes that are declared."""
+    # The repr of a class is its name: two of one name may have other fields.
     named = [each[0] for each in kinds if isinstance(each, tuple) and hasattr(each[0], "_fields")]
     return repr((kinds, [(each._fields, sizes_of(each)) for each in named]))

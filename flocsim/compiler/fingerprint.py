@@ -54,9 +54,12 @@ def value_text(value: Any) -> str:
         return f"{kind} {value!r}"
     if is_named_tuple(kind):
         return f"{value_text(kind)}({', '.join(map(value_text, value))})"
+    # A kernel that makes such tuples reads their class: fields and defaults say all of it.
     if is_named_tuple(value):
         defaults = value_text(tuple(value._field_defaults.items()))
         return f"class {value.__name__}{value._fields} {defaults}"
+    # The rest must be found under its own name in a versioned module: then its name and the
+    # versions in the hash determine what it does. Random numbers never do.
     module, name = getattr(value, "__module__", None), getattr(value, "__name__", None)
     if isinstance(module, str) and isinstance(name, str) and "random" not in module:
         for owner in (module, module.partition(".")[0]):
@@ -74,6 +77,7 @@ def is_named_tuple(kind: Any) -> bool:
 def refusal(value: Any) -> str:
     """Return what a value without a text is, and what to write in its place."""
     kind, owner = type(value), type(getattr(value, "__self__", None))
+    # A bound method of a random generator tells its module only through the generator.
     modules = f"{getattr(value, '__module__', None)}.{kind.__module__}.{owner.__module__}"
     if {"random", "_random"} & set(modules.split(".")):
         return "which draws random numbers: no run could be repeated; leave them out"
@@ -89,6 +93,7 @@ def refusal(value: Any) -> str:
 @functools.lru_cache(maxsize=4096)
 def code_text(code: types.CodeType, docstring: str | None = None) -> str:
     """Return a text that determines what code does, without docstring, line numbers and file."""
+    # Constants enter by repr: 0.0 and −0.0, or 1 and 1.0, are equal, but compile to other code.
     constants = [
         code_text(each) if inspect.iscode(each)
         else sorted(map(repr, each)) if isinstance(each, frozenset)  # in any order otherwise
@@ -118,6 +123,7 @@ def own_lines(function: Any) -> tuple[list[str], dict[str, Any]]:
     read = {f"the global {'.'.join(chain)!r}": value for chain, value in reads(function).items()}
     called = {}
     for name, value in {"a default argument": defaults, **read}.items():
+        # Functions get lines of their own; the value of anything else must determine it.
         if isinstance(value, types.FunctionType) and not is_library(value):
             called[name] = value
             continue
@@ -144,6 +150,7 @@ def describe(entry: Any) -> Description:
         own, called = own_lines(function)
         lines += own
         for name, value in called.items():
+            # A unit of its own: its name suffices, as its code is stored and checked by itself.
             if hasattr(value, "apart"):
                 lines.append(f"{name}->{value.apart}")
                 calls[value.apart] = value
@@ -158,6 +165,7 @@ def describe(entry: Any) -> Description:
 def refuse_python(function: Any) -> None:
     """Raise KernelError where a function prints or raises, which compiled code cannot do while it
     runs."""
+    # `assert` compiles to the instruction of `raise`.
     operations = {one.opname for each in codes_in(function.__code__) for one in dis.Bytecode(each)}
     if "RAISE_VARARGS" in operations or any(each is print for each in reads(function).values()):
         raise KernelError(
@@ -183,6 +191,7 @@ def fingerprint(
     """
     units: dict[str, Description] = {}
     pending = {"": linked or Linker(fillings).link(entry)}
+    # Follow the calls from unit to unit, until each of them has been described once.
     while pending:
         name, function = pending.popitem()
         units[name] = describe(function)

@@ -1,5 +1,8 @@
-"""What a function reads beside its arguments: globals, and attributes of the user's modules. And
-clones of functions, with others in the place of hooks: what a scene's driver reaches, as one."""
+"""The globals that functions read, and clones of functions in which hooks are replaced.
+
+`reads` finds what a function depends on beside its arguments: globals, and attributes of modules.
+`Linker` copies a driver with every function that it reaches, the hooks of a scene filled.
+"""
 
 import builtins
 import dis
@@ -15,6 +18,7 @@ import attrs
 
 from flocsim.errors import KernelError
 
+# Opcodes that read an attribute. Python 3.11 has a second one, for calls such as a.b().
 ATTRIBUTE_LOADS = ("LOAD_ATTR", "LOAD_METHOD")
 
 MISSING = object()
@@ -39,6 +43,7 @@ def refuse_closure(function: Any) -> None:
 
 def codes_in(code: types.CodeType) -> list[types.CodeType]:
     """Return the code and all that is nested in it."""
+    # Nested functions and comprehensions are constants of the code around them.
     nested = filter(inspect.iscode, code.co_consts)
     return [code, *(each for one in nested for each in codes_in(one))]
 
@@ -55,13 +60,14 @@ def is_versioned(module: types.ModuleType) -> bool:
     if root in ("numpy", "numba"):
         return True
     file = getattr(module, "__file__", None) or os.__file__
+    # Installed packages lie in the same folder, but Python's version says nothing of them.
     of_python = file.startswith(os.path.dirname(os.__file__)) and "-packages" not in file
     return root in sys.stdlib_module_names and of_python
 
 
 def is_library(function: Any) -> bool:
-    """Return True for functions of Python, numpy and numba, which have their own way in compiled
-    code."""
+    """Return True for functions of Python, numpy and numba, of which numba has implementations of
+    its own."""
     module = sys.modules.get(function.__module__ or "")
     return module is not None and module.__name__ != "__main__" and is_versioned(module)
 
@@ -82,6 +88,8 @@ def chains(code: types.CodeType) -> tuple[tuple[str, ...], ...]:
     for each in codes_in(code):
         follows = False
         for instruction in dis.get_instructions(each):
+            # Attributes that follow at once belong to the global; other instructions end the chain.
+            # EXTENDED_ARG only widens the argument of the next one.
             if instruction.opname == "LOAD_GLOBAL":
                 found.append([instruction.argval])
                 follows = True
@@ -102,6 +110,7 @@ def reads(function: Any) -> dict[tuple[str, ...], Any]:
     for chain in chains(function.__code__):
         name, used = chain[0], 1
         value = known[name] if name in known else getattr(builtins, name, MISSING)
+        # Follow the chain through modules alone: the attributes of any other value are part of it.
         while isinstance(value, types.ModuleType) and used < len(chain):
             name, used = value.__name__, used + 1
             value = getattr(value, chain[used - 1], MISSING)
@@ -115,23 +124,29 @@ def reads(function: Any) -> dict[tuple[str, ...], Any]:
                 f"kernel {where(function)} uses the module {'.'.join(chain[:used])!r} as a value; "
                 "write module.name where a name of it is needed"
             )
+        # A name that is defined nowhere is left out: compiling or calling the function reports it.
         if value is not MISSING:
             found[chain[:used]] = plain(value)
     return found
 
 
 def apart(function: Callable) -> Callable:
-    """Mark a function that is compiled by itself (flocsim.compiler.units), and called by what
-    reaches it as one C file calls another: one that reaches much, takes much longer than a call,
-    and is called from several places or by several engines. It returns numbers."""
+    """Mark a function that is compiled by itself (flocsim.compiler.units), and called like a
+    function of another C file.
+
+    This pays for a function that reaches much code, runs much longer than a call takes, and has
+    several callers or engines. It must return numbers.
+    """
     function.apart = f"{function.__module__}.{function.__qualname__}"  # type: ignore[attr-defined]
     return function
 
 
 def loops_apart(function: Callable) -> Callable:
-    """Mark a function that is compiled by itself, and is a loop over many numbers without a branch,
-    or does to four numbers side by side what it does to one: it takes several of them at once, to
-    the same bits."""
+    """Mark a function that is compiled by itself, in vector instructions.
+
+    This pays for loops without branches over many numbers, and for the same arithmetic on four
+    numbers side by side. Results are the same to the last bit.
+    """
     function.loops = True  # type: ignore[attr-defined]
     return apart(function)
 
@@ -167,6 +182,7 @@ class Linker:
         if not isinstance(value, types.FunctionType) or is_library(value):
             other = self.replace(value)
             return value if other is None else other
+        # Clone each function once, so that all its callers share what is compiled of it.
         filled = self.fillings.get(value, value)
         if filled not in self.clones:
             if (other := self.replace(filled)) is None:
@@ -187,6 +203,7 @@ class Linker:
             for each in modules:  # stand-ins for modules, with what is read alone
                 names = vars(names.setdefault(each, types.ModuleType(each)))
             names[name] = self.link(value)
+        # Bytecode finds globals by name in whatever dictionary it is given: it need not be changed.
         copy = types.FunctionType(
             function.__code__, linked, function.__name__, function.__defaults__
         )

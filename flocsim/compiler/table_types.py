@@ -45,6 +45,7 @@ LETTERS = {letter: from_dtype(np.dtype(letter)) for letter in "?dqQfi"}
 class Addressed(types.Type):
     """What is handed over by its address, with fields: {name: (type, position)}."""
 
+    # Words of a table that hold it: one, its address, unless it lies in the table itself.
     words = 1
 
     def __init__(self, name, fields):
@@ -79,6 +80,7 @@ class Elements(Addressed):
 
     def __init__(self, dtype, sizes):
         self.dtype, self.sizes, self.ndim = dtype, sizes, len(sizes)
+        # The address of the data, then one size for each axis.
         self.words = 1 + self.ndim
         fields = {"shape": (types.UniTuple(types.intp, self.ndim), 1)}
         super().__init__(f"elements_{dtype}_{'_'.join(map(str, sizes))}", fields)
@@ -125,6 +127,7 @@ def type_of(value: Any, sizes: tuple[int, ...] = ()) -> Any:
         name: type_of(each, declared.get(name, ()))
         for name, each in zip(named._fields, value, strict=True)
     }
+    # Numbers alone are a view, as kernels receive it: handed over by value.
     if all(isinstance(each, types.Number) for each in found.values()):
         return types.NamedTuple(list(found.values()), named)
     return Table(named.__name__, found)
@@ -157,6 +160,7 @@ def store(context, builder, kind, value, place, name):
 
 def read_word(builder, table, at):
     """Load a word of a table."""
+    # An invariant load may be moved out of loops and past any store.
     load = builder.load(builder.gep(table, [WORD(at)], inbounds=True))
     load.set_metadata("invariant.load", builder.module.add_metadata([]))
     return load
@@ -164,6 +168,7 @@ def read_word(builder, table, at):
 
 def value_at(context, builder, kind, table, at):
     """Return the value of a numba type that begins at a position of a table."""
+    # These lie in the table: nothing is read before a field or an element is asked for.
     if isinstance(kind, Table | Elements):
         return builder.gep(table, [WORD(at)], inbounds=True)
     if isinstance(kind, types.BaseTuple):
@@ -177,6 +182,7 @@ def value_at(context, builder, kind, table, at):
     word = read_word(builder, table, at)
     if isinstance(kind, Row):
         return builder.inttoptr(word, WORD.as_pointer())
+    # A word holds the 64 bits of a double as they are, and other numbers as an integer.
     if kind == types.float64:
         return builder.bitcast(word, ir.DoubleType())
     return context.cast(builder, word, types.int64, kind)
@@ -184,6 +190,7 @@ def value_at(context, builder, kind, table, at):
 
 def size(builder, kind, value, axis):
     """Return a size of an array."""
+    # A constant size lets LLVM compute offsets when it compiles.
     known = kind.sizes[axis]
     return WORD(known) if known else read_word(builder, value, 1 + axis)
 
@@ -197,10 +204,12 @@ def place_of_element(context, builder, kind, value, index, given):
     offset = WORD(0)
     for axis, (part, number) in enumerate(zip(parts, numbers, strict=True)):
         number = context.cast(builder, number, part, types.intp)
+        # C order by Horner's rule, (i₀ n₁ + i₁) n₂ + i₂ …; nsw: indices never overflow.
         if axis:
             offset = builder.mul(offset, size(builder, kind, value, axis), flags=["nsw"])
             number = builder.add(offset, number, flags=["nsw"])
         offset = number
+    # Records are addressed in words: each of their fields is one word long.
     if isinstance(kind.dtype, Row):
         offset = builder.mul(offset, WORD(kind.dtype.size // 8), flags=["nsw"])
     element = WORD if isinstance(kind.dtype, Row) else context.get_data_type(kind.dtype)
@@ -347,6 +356,7 @@ def call_of(target: Callable[[list[Any]], tuple[str, str]]) -> Any:
     @intrinsic
     def pair(typing, given):
         kinds = [types.unliteral(each) for each in parts_of(given)]
+        # Without a symbol, the first value is the address and no argument of the callee.
         symbol, letters = target(kinds)
         handed = types.Tuple.from_types(kinds if symbol else kinds[1:])
         kind = type_of_letters(letters)
@@ -359,6 +369,7 @@ def call_of(target: Callable[[list[Any]], tuple[str, str]]) -> Any:
             packed = context.make_tuple(builder, handed, values[-len(handed) :])
             builder.store(packed, place)
             called = ir.FunctionType(WORD, [WORD, WORD])
+            # Declare a unit once in a module; its address is filled in when the code is loaded.
             if symbol:
                 known = builder.module.globals.get(symbol)
                 function = known or ir.Function(builder.module, called, symbol)
@@ -371,6 +382,7 @@ def call_of(target: Callable[[list[Any]], tuple[str, str]]) -> Any:
         return types.Tuple.from_types([types.int64, kind])(given), generate
 
     def call(*given):
+        # Exceptions do not pass from one unit to another: raise again what the callee has reported.
         failed, answer = pair(given)
         if failed != 0:
             raise RuntimeError
