@@ -39,6 +39,7 @@ HOOKS: dict[str, Callable] = {}
 """{"module.name": function}: all functions that may be replaced."""
 
 LAWS: dict[str, tuple[Any, int]] = {
+    # Forces and derivatives are separate laws, as most evaluations need forces alone.
     "body_force": (BodyView, 3),
     "velocity_derivatives": (BodyView, 9),
     "position_derivatives": (BodyView, 9),
@@ -71,6 +72,7 @@ def hook(function: Function) -> Function:
     return function
 
 
+# These defaults do nothing: without an observer, for example, no run is stopped.
 @hook
 @apart
 def attempt(scene, work, clock, step):
@@ -99,6 +101,7 @@ def observe(scene, work, observed, time):
     return 0
 
 
+# Uncompiled, these hooks call the functions in scene.laws; compiled_calls replaces all of them.
 @hook
 def has(scene, law):
     """Return True if the scene has a law."""
@@ -207,11 +210,13 @@ def argument_types(law: str, plain: bool) -> Any:
     number, view = types.float64, view_of(law, plain)
     more = (types.int64,) if law == "contact_event" else ()
     given = types.NamedUniTuple(number, len(view._fields), view)
+    # The array of parameters has any length: new values and more forces recompile no engine.
     return given, Elements(number, (0,)), *more
 
 
 def signature_text(law: str, plain: bool) -> str:
     """Return the signature of a law as text, which is part of its cache key."""
+    # The names of fields belong to it: a view of other fields needs other machine code.
     return f"{law} {view_of(law, plain)._fields} {LAWS[law][1]}"
 
 
@@ -246,6 +251,7 @@ def call_of_law(law, plain):
     from flocsim.compiler.table_types import call_of
 
     def target(given):
+        # Nothing checks the types behind an address: a mismatch would read wrong memory.
         expected = argument_types(law, plain)
         assert tuple(given[1:]) == expected, f"{law} is given {given}"
         return "", "d" * LAWS[law][1]
@@ -260,6 +266,7 @@ def law_table(functions: dict[str, Callable], *, jit: bool, plain: bool = False)
     ``plain`` as in compiled_calls. Raises KernelError for a law that cannot be compiled.
     """
     if not jit:
+        # Uncompiled scenes call the functions themselves; None stands for no law.
         return tuple(functions.get(name) for name in LAWS)
     # Addresses of compiled laws; 0 where the scene has none.
     addresses = [0] * len(LAWS)

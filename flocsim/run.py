@@ -93,6 +93,7 @@ class Run:
         self.clock.until = until
         self.observed = np.zeros(1) if observed is None else observed
         n = len(scene.bodies)
+        # Of fixed size for the compiled loop, which returns when it is full; empty: none is kept.
         self.record = np.zeros((RECORD_ROWS if record else 0, 1 + 6 * n))
         self.saved = [self.row_now()]
 
@@ -106,6 +107,7 @@ class Run:
 
         A pause comes between two steps and changes nothing.
         """
+        # Compiled code cannot be interrupted: pauses let the caller check clock and signals.
         self.counts.pause_at = self.counts.steps + (steps or STEPS_AT_A_TIME)
         while True:
             code = self.driver(
@@ -123,6 +125,7 @@ class Run:
 
     def copy(self) -> "Run":
         """Return the same run with arrays of its own: either may continue."""
+        # The scene is shared, as no run changes it.
         other = object.__new__(type(self))
         vars(other).update(vars(self), work=copy_of(self.work))
         other.clock, other.counts = self.clock.copy(), self.counts.copy()
@@ -154,6 +157,7 @@ class Run:
     def rows(self) -> np.ndarray:
         """Return the record (k, 1 + 6 n): time, then x, y, angle, vx, vy, spin of every body. If
         steps are not kept, it has the start and the end only."""
+        # A record contains its last step already.
         end = [] if len(self.record) else [self.row_now()]
         return np.concatenate([*self.saved, *end])
 
@@ -209,6 +213,7 @@ def views_of(
     ``located(scene, work)`` lists the pairs there (see locate).
     """
     bodies = range(len(system.bodies))
+    # The later body first, as in the engine.
     pairs = [(a, b) for a in bodies for b in range(a) if counts_as_pair(scene.bodies, a, b)]
     views = {
         "bodies": [body_view(scene, work, time, NOW, body) for body in bodies],
@@ -219,6 +224,7 @@ def views_of(
         rows = range(work.tally.candidates)
         touching = [row for row in rows if work.geometry[NOW, row].gap < 0.0]
         flag_near(scene, work, NOW, 0.0)
+        # Candidates of a pair of bodies are consecutive rows, which share one smooth gap.
         first, views["surfaces"] = 0, []
         while first < len(rows):
             end = pair_end(work, first)
@@ -256,6 +262,7 @@ def invalid_value(force: Any, pieces: Pieces, views: Iterable, fluid: Any) -> st
     """
     parameters = np.array(pieces.parameters, dtype=float)
     for name, law in pieces.laws.items():
+        # Event functions are numbered, and evaluated one by one.
         each_event = [(event,) for event in range(pieces.events)]
         most = math.inf if name in INFINITE_ALLOWED else LARGEST
         for view, which in product(views, each_event if name == "contact_event" else [()]):
@@ -272,6 +279,7 @@ def invalid_value(force: Any, pieces: Pieces, views: Iterable, fluid: Any) -> st
 def force_to_blame(system: Any, run: Run) -> str:
     """Return the force of a System that gives NaN, or more than LARGEST, where a Run has ended, in
     words; "" if none does."""
+    # Plain functions, as each force is evaluated by itself: compiled laws are sums of forces.
     scene: Any = system.scene(jit=False)
     start = motion_of(run.work, NOW)
     # A state that is not finite says nothing about its cause.

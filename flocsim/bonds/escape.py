@@ -27,6 +27,7 @@ def forces_at_rest(scene, work, time, a, b, distance, gap, displacement):
     ``distance`` of the centres and ``gap`` of the outlines [m] are the values there,
     ``displacement`` [m] is how far a was moved.
     """
+    # At rest: all rates are zero, so that drag and lubrication do not count.
     centres, outlines = 0.0, 0.0
     sizes = scene.bodies[a].equivalent_radius + scene.bodies[b].equivalent_radius
     if has(scene, CENTRE_FORCE):
@@ -54,7 +55,7 @@ def attraction_at(scene, work, time, bond, displacement):
 
 
 def path_length(scene, bond):
-    """Return how far the way out leads [m]: to two mean diameters beyond contact."""
+    """Return the length of the path outwards [m], to two mean diameters beyond contact."""
     radii = radii_of(scene, bond)
     return 2.0 * radii + max(-bond.surface_gap, radii - bond.distance, 0.0)
 
@@ -83,8 +84,10 @@ def can_escape(scene, work, time, bond, load, needed):
     """
     if not load < math.inf or has(scene, ORIENTED_ENERGY):
         return True
+    # Work done along the way out, of which the load does a part; its maximum is the barrier.
     energy, displacement, end = 0.0, 0.0, path_length(scene, bond)
     while displacement < end:
+        # Increments grow with the gap, as attraction varies over a distance of its order.
         increment = CLIMB_STEP * variation_length(scene, bond, displacement, end)
         increment = max(increment, LEAST_CLIMB_STEP)
         # Midpoint rule.

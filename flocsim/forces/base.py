@@ -77,6 +77,7 @@ class PairForce(Force):
     gap [N/m], for the implicit integrators; otherwise they use central differences of the kernel.
     """
 
+    # A class attribute and no field: a kernel, not a parameter that a user sets.
     slope: ClassVar[Any] = None
 
     @property
@@ -91,6 +92,7 @@ class PairForce(Force):
     @property
     def reach(self) -> float:
         """Gap [m] beyond which the force is taken as zero and its kernel is not called."""
+        # Any finite default would make a force jump to zero there.
         return np.inf
 
 
@@ -129,6 +131,7 @@ class OutlineForce(PairForce):
         Extent of the bodies in the third direction [m]; "sphere" is 4/3 r_eq of the smaller body.
     """
 
+    # By keyword alone: a subclass can then declare fields without defaults.
     depth: float | str = word_or_quantity("sphere", "m", above=0.0, default="sphere", kw_only=True)
 
     acts_on = "outlines"
@@ -173,6 +176,7 @@ class ContactForce(Force):
 
     acts_on = "contacts"
 
+    # None: no friction limit, and no kinks in the law.
     slip_limit: ClassVar[Any] = None
     events: ClassVar[Any] = None
 

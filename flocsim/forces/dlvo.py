@@ -148,6 +148,7 @@ class VanDerWaals(PairForce):
     @staticmethod
     def kernel(pair, hamaker, d_min):
         """Return the force −H_A r*/(6 d²) [N]."""
+        # Tang et al. (2014), eq. 5: constant below d_min, as it diverges at d = 0.
         d = max(pair.gap, d_min)
         return -hamaker * pair.reduced_radius / (6.0 * d * d)
 
@@ -252,6 +253,7 @@ class DoubleLayer(PairForce):
     @property
     def strength(self) -> float:
         """4π ε0 ε_r κ φ_i φ_j [N/m]: the repulsion at contact per unit of reduced radius."""
+        # Tang et al. (2014), eq. 6, with φ_i φ_j in the place of φ².
         return 2.0 * self.between_charges / self.debye_length
 
     @property
@@ -287,6 +289,7 @@ class DoubleLayer(PairForce):
     @property
     def reach(self) -> float:
         """Gap [m] at which the repulsion becomes negligible, or ``cut`` if that is smaller."""
+        # exp(−κ d) equals NEGLIGIBLE_FORCE.
         return smaller_reach(self.cut, -math.log(NEGLIGIBLE_FORCE) * self.debye_length)
 
     @property
@@ -311,6 +314,7 @@ class DoubleLayer(PairForce):
     @staticmethod
     def kernel(pair, strength, kappa):
         """Return the force strength · r* · exp(−κ d) [N]."""
+        # Equivalent spheres of irregular flocs overlap at contact: they count as touching.
         return strength * pair.reduced_radius * math.exp(-kappa * max(pair.gap, 0.0))
 
     @staticmethod
@@ -331,6 +335,7 @@ class BoundaryCorrection(DoubleLayer):
     @property
     def parts(self) -> tuple[float, float, float]:
         _, even, odd = super().parts
+        # The charges contain superposition already: subtract its pressure from the full one.
         return -self.first, even, odd
 
 

@@ -36,6 +36,7 @@ SCHILLER_NAUMANN_UP_TO = 800.0
 def flow_at(flow, x, y):
     """Return (u_x, u_y, Ω) of the flow (u_x, u_y, g_xx, g_xy, g_yx, g_yy) at a position."""
     u_x, u_y, g_xx, g_xy, g_yx, g_yy = flow
+    # Ω is the spin of a fluid element, half the vorticity.
     return u_x + g_xx * x + g_xy * y, u_y + g_yx * x + g_yy * y, 0.5 * (g_yx - g_xy)
 
 
@@ -68,6 +69,7 @@ def resistance_load(body, c, s, vx, vy, spin):
 
     ``c`` and ``s`` are the cosine and sine of the angle of the body.
     """
+    # Velocities are rotated into the frame of the shape; a spin in the plane is the same there.
     ahead, aside = c * vx + s * vy, c * vy - s * vx
     return (
         body.resistance_xx * ahead + body.resistance_xy * aside + body.resistance_xs * spin,
@@ -88,8 +90,10 @@ def sphere_load(body, x, y, spin, viscosity, density, options):
     ``options``: (rotational, with_inertia, permeability).
     """
     rotational, with_inertia, permeability = options
+    # Stokes drag, Tang et al. (2014), eq. 4, and the torque on a rotating sphere in slow flow.
     translation = 6.0 * math.pi * viscosity * body.radius
     rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
+    # Brinkman: a sphere that water flows through resists less than a solid one.
     if permeability > 0.0:
         translation *= drag_factor(body.radius, permeability)
         rotation *= turning_factor(body.radius, permeability)
@@ -373,6 +377,7 @@ def unit_resistance(outline: tuple[bytes, ...], height: float) -> tuple[float, .
         rings = [np.frombuffer(ring).reshape(-1, 2) for ring in outline]
         drag = rigid_bodies.prism_drag(rings, height)
         r = drag.resistance
+        # A resistance with a negative eigenvalue would drive a body instead of braking it.
         if not np.linalg.eigvalsh(r)[0] > 0.0:
             raise UsageError(
                 f"the drag of an outline {height:.3g} r_eq deep cannot be computed: its resistance "
@@ -390,6 +395,7 @@ def unit_resistance(outline: tuple[bytes, ...], height: float) -> tuple[float, .
 @functools.cache
 def computation_key(*modules: Any) -> str:
     """Return a key for stored results besides their input: code of modules, versions, processor."""
+    # Other code, libraries or processors may give other digits: their results are stored apart.
     code = hashlib.blake2b(digest_size=16)
     for module in modules:
         code.update(inspect.getsource(module).encode())

@@ -78,6 +78,7 @@ class Lubrication(SurfaceForce):
     @staticmethod
     def kernel(pair, viscosity, h_min, cut):
         """Return the force −6πγ r*² ḣ/h [N]."""
+        # Kim and Karrila (1991), ch. 9; the fade brings it to zero at the cut without a jump.
         share, _ = fading(pair.gap, cut)
         resistance = 6.0 * math.pi * viscosity * pair.reduced_radius**2 / max(pair.gap, h_min)
         return -share * resistance * pair.gap_rate
@@ -159,6 +160,7 @@ def resistance_of_pairs(forces: Iterable[Force]) -> PairResistance | None:
                 "Lubrication is a part of PairResistance and would count twice: leave one of them "
                 "out"
             )
+        # Fluctuation–dissipation: kicks must have the covariance of the joint resistance.
         if isinstance(force, Thermal) and not force.absent:
             raise UsageError(
                 "thermal kicks do not go with PairResistance, for they would have to be correlated "
@@ -211,6 +213,7 @@ def pair_resistance_tables(
             f"h_min of PairResistance must be {pair.NEAREST:g} to .1 of the mean radius of "
             f"two bodies, {mean:.3g} m, found {force.h_min:g} m"
         )
+    # Two spheres have the gap that the tables are made for: near_cut is 0.
     spheres = all(len(body.shape.vertices) == 1 for body in bodies)
     water = Water.one()
     water.viscosity, water.mean_radius, water.floor = fluid.viscosity, mean, force.h_min
@@ -225,6 +228,7 @@ def pair_resistance_tables(
 
 def lubrication_stand_in(force: PairResistance) -> Lubrication:
     """Return a Lubrication force that varies as fast as the pair resistance does."""
+    # A fade that begins at 1000 h_min leaves 1/h as the only scale on which it varies.
     return Lubrication(force.h_min, force.h_min / FADES_FROM * 1e3)
 
 

@@ -30,6 +30,7 @@ def no_force(view, parameters):
 
 def lone_view(system, body):
     """Return the BodyView of a body at rest at the origin."""
+    # All fields before the numbers of the shape's resistance are zero, or replaced below.
     shape, zeros = body.shape, [0.0] * BodyView._fields.index("resistance_xx")
     view = BodyView(*zeros, *drag.resistance_numbers(system.forces, body))
     return view._replace(
@@ -100,6 +101,7 @@ def largest_mobility(system: Any, body: Body, speed: float, mobility: float) -> 
     if drag.follows_shape(system.forces):
         return free_mobilities(system, body)[1]
     at_rest = resistance(system, body, 0.0, REST_SPEED * speed + 1e-9)
+    # The mobility is 1/resistance, so that the product is the ratio of the two resistances.
     return max(mobility, 1.0 / at_rest) if at_rest * mobility > NEGLIGIBLE_RESISTANCE else mobility
 
 
@@ -128,6 +130,7 @@ def nonrotating_mobility(system: Any, body: Body) -> float:
 def free_mobilities(system: Any, body: Body) -> tuple[float, float]:
     """Return the (smallest, largest) mobility [s/kg] over directions, of a freely rotating body."""
     resistance, _ = drag.resistance_matrices(drag.body_resistance(body))
+    # Invert the full R: a free body turns until its torque vanishes. Eigenvalues are the extremes.
     mobility = np.linalg.inv(resistance)[:2, :2] / system.fluid.viscosity
     least, largest = np.linalg.eigvalsh(mobility).tolist()
     return least, largest
@@ -136,6 +139,7 @@ def free_mobilities(system: Any, body: Body) -> tuple[float, float]:
 def describe_undefined_force(system, body, velocity):
     """Describe which body force is undefined at or around a velocity."""
     at = f"a velocity of ({velocity[0]:.3g}, {velocity[1]:.3g}) m/s"
+    # Evaluate each force by itself: a sum does not tell which of its terms is NaN.
     for force in system.pieces.used.values():
         own = laws_of([force], system.fluid)
         law = own.laws.get("body_force")
@@ -164,6 +168,7 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
             raise UsageError(
                 f"no terminal velocity: {describe_undefined_force(system, body, velocity)}"
             )
+        # Singular: in some direction no drag can balance a force.
         if not abs(np.linalg.det(slope)) > 0.0:
             break
         change = np.linalg.solve(slope, balance(*known, velocity))

@@ -97,11 +97,13 @@ class Integrator(ABC):
     copy of a run, a System and a Swarm can all resume.
     """
 
+    # No error control and no largest step, unless a method declares them as fields.
     tolerance = math.inf
     first_step = 1e-6
     largest_step = math.inf
     estimate_share = 1.0
     across = False
+    # True if the method may change to backward Euler during a run and back (Implicit).
     hands_over = False
 
     @staticmethod
@@ -139,6 +141,7 @@ class Integrator(ABC):
     @property
     def fillings(self) -> dict[Callable, Callable]:
         """{hook: function} of this integrator, its attempt and next_step among them."""
+        # ``replaces`` comes last, so that a method may fill these two hooks differently.
         return {
             hooks.attempt: self.attempt, hooks.next_step: self.next_step, **self.replaces,
         }  # fmt: skip
@@ -159,5 +162,6 @@ class Integrator(ABC):
 
     def fresh_counts(self, max_steps: int) -> Counts:
         """Return the counters of a run with a budget of steps, tried ones included."""
+        # 0: a method that may hand over begins to compare its progress at once.
         next_check = 0 if self.hands_over else NEVER
         return Counts.one(max_steps=max_steps, pause_at=NEVER, next_check=next_check)

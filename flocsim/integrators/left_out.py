@@ -1,10 +1,9 @@
 """Parts of the engine that a scene never reaches, and that are left out to save compile time.
 
-For few bodies: the search for near pairs among many; all pairs of few bodies are watched
-(flocsim.state.work: ALL_PAIRS). For two bodies of a
-System also backward Euler, which Implicit does not hand over to below FEWEST bodies
-(backward_euler/method.py). Where no force needs them: sums along outlines, sums over charges, the
-numbers of shapes that drag in a flow uses, and the resistance of water between bodies.
+With few bodies: the search for near pairs, as all pairs are watched (flocsim.state.work:
+ALL_PAIRS). With two bodies in a System: backward Euler, to which Implicit does not hand over below
+FEWEST bodies (backward_euler/method.py). Where no force needs them: sums along outlines, sums over
+charges, the numbers of shapes that drag in a flow uses, and the resistance of water between bodies.
 """
 
 import math
@@ -29,6 +28,7 @@ from flocsim.integrators.rhs import (
 from flocsim.state.work import ALL_PAIRS
 
 
+# Each takes the arguments of what it replaces, and reports that there is nothing to do.
 def list_none(scene, work, cut):
     """List no pairs: all are listed from the start."""
     return True

@@ -63,6 +63,7 @@ def evaluate_as_they_lie(scene, work):
     All candidate pairs are listed and their modes set anew from the positions. False means that the
     list of candidates is full.
     """
+    # The existing list was made for other positions: which pairs are near must be found anew.
     if not rebuild_list(scene, work):
         return False
     locate_and_flag(scene, work, NOW)
@@ -106,6 +107,7 @@ def move_slips(scene, work, step):
         # An open contact has no displacement.
         slip[NEW, row] = 0.0
         if work.candidates[row].contact_mode == CLOSED:
+            # Contacts that were open at the start have no rate there.
             rate = tangential_rate(work, NEW, row)
             if work.geometry[NOW, row].gap < 0.0:
                 rate = 0.5 * (rate + tangential_rate(work, NOW, row))
@@ -128,6 +130,7 @@ def locate_and_flag(scene, work, state):
 
     Fixed steps do not end at events: every evaluation sets the modes anew.
     """
+    # Geometry first: gaps decide which contacts are closed, and which share surface forces.
     locate_contacts(scene, work, state)
     set_closed(work, state)
     flag_near(scene, work, state, 0.0)
@@ -151,6 +154,7 @@ class FixedStep(Integrator):
 
     @staticmethod
     def next_step(clock, step, ratio):
+        # The last step before a stop is shorter: return to the full size after it.
         return clock.largest_step
 
     @property
@@ -164,4 +168,5 @@ class FixedStep(Integrator):
     @property
     def replaces(self) -> dict[Callable, Callable]:
         """{hook: function}: contacts are located and their modes set at every evaluation."""
+        # By default modes change at events only, at which fixed steps do not end.
         return {locate_acting: locate_and_flag}

@@ -149,6 +149,7 @@ def charges_of_shape(shape: Shape, kappa: float) -> np.ndarray:
     pieces = pieces_of_shape(shape)
     places = without_close(points_of(pieces, kappa)[1], MERGE_DISTANCE * unit_of(shape, kappa))
     points, _ = points_of(pieces, kappa, 2)
+    # The potential of each unit charge at each point. K₀(16) = 3.5e-8: far ones can be dropped.
     if len(places) <= DENSE:
         matrix, solve = k0(kappa * distances(points, places)), np.linalg.solve
     else:
@@ -167,6 +168,7 @@ def without_close(places, near):
 
     remaining = np.ones(len(places), bool)
     pairs = cKDTree(places).query_pairs(near, output_type="ndarray")
+    # In ascending order, as a position that has been dropped must drop no other one.
     for first, second in sorted(map(sorted, pairs.tolist())):
         remaining[second] &= not remaining[first]
     return places[remaining]
@@ -200,6 +202,7 @@ def grouped_charges(shape: Shape, kappa: float) -> Charges:
     found = clusters(charges_of_shape(shape, kappa))
     groups, first = ChargeGroup.rows(len(found)), 0
     for group, members in zip(groups, found, strict=True):
+        # A circle around the group, by which sums skip it where it is out of reach.
         middle = 0.5 * (members[:, :2].min(axis=0) + members[:, :2].max(axis=0))
         group.x, group.y = middle
         group.extent = np.hypot(*(members[:, :2] - middle).T).max()
@@ -217,6 +220,7 @@ def charges_of_bodies(shapes: Sequence[Shape], kappa: float) -> Charges:
     groups = ChargeGroup.joined(each.groups for each in found)
     sizes = [len(each.groups) for each in found]
     before = np.cumsum([0, *[len(each.charges) for each in found[:-1]]])
+    # Rows of charges count over all bodies: shift those of each body after the first.
     groups["first"] += np.repeat(before, sizes)
     first = np.cumsum([0, *sizes]).astype(np.int64)
     return Charges(groups, first, Charge.joined(each.charges for each in found))
@@ -312,6 +316,7 @@ def fill_tiles(bessel, groups, charges, kappa, step, corners, near, field):
     """Write the nodes of tiles with the given lower left corners (m, 2); ``near`` is scratch."""
     side, half = TILE + 1, 0.5 * TILE * step
     for tile in range(corners.shape[0]):
+        # List once what may act in a tile; 1.5 of half its side is more than half its diagonal.
         x, y = corners[tile, 0] + half, corners[tile, 1] + half
         reach = (LAYER_REACH + 1.0) / kappa + 1.5 * half
         count = list_groups(groups, x, y, reach, near)
@@ -337,6 +342,7 @@ def tiles_around(shape, kappa, step):
     counts = np.ceil((high - low) / width).astype(int)
     x, y = (low[k] + width * (np.arange(counts[k]) + 0.5) for k in range(2))
     middles = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    # Three quarters of a side cover the distance from a tile's middle to its corners.
     most, inside = reach + 0.75 * width, FIELD_DEPTH * unit_of(shape, kappa) + 0.75 * width
     distance, nearest = cKDTree(points).query(middles, distance_upper_bound=most)
     used = np.isfinite(distance)
@@ -360,6 +366,7 @@ def field_of_shape(shape: Shape, kappa: float) -> Field:
     nodes = int(used.sum()) * side * side
     if nodes > MOST_NODES:
         raise too_long(shape, kappa, f"{nodes:.3g} nodes of its field, of {MOST_NODES}")
+    # For each tile the row of its first node, or −1 where the field is not tabulated.
     tiles = np.where(used, (np.cumsum(used) - 1) * side * side, -1)
     places = np.flatnonzero(used)
     corners = low + TILE * step * np.column_stack([places % counts[0], places // counts[0]])

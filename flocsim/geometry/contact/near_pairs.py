@@ -40,6 +40,7 @@ def in_other_frame(pose, vertices, point):
 def edge_distance2(vertices, x, y, point):
     """Return the squared distance of a position from the feature that begins at a core point
     [m²]."""
+    # A point without an edge has the offset 0: its feature is the point itself.
     end = point + vertices[point].edge_offset
     return segment_distance2(
         x, y, vertices[point].x, vertices[point].y, vertices[end].x, vertices[end].y
@@ -58,7 +59,7 @@ def extent_of(outlines, body):
 
 def feature_distance(outlines, b, pose, point, least):
     """Return the smaller of ``least`` and the distance of one feature of a body from the core of
-    body b [m], less what their spheroradii exceed the smallest by."""
+    body b [m], less the excess of both spheroradii over the smallest of each body."""
     vertices = outlines.vertices
     x, y = in_other_frame(pose, vertices, point)
     end_x, end_y = in_other_frame(pose, vertices, point + vertices[point].edge_offset)
@@ -88,6 +89,8 @@ def core_distance(outlines, a, b, pose):
     # Then all features that may be nearer.
     back = reversed_pose(pose)
     for point in range(outlines.first[a], outlines.first[a + 1]):
+        # Triangle inequality: what is nearer than ``least`` to b's core is nearer to b's
+        # centroid than ``least`` plus b's extent.
         most = reach + least + vertices[point].excess_radius
         if most > 0.0 and edge_distance2(vertices, back[2], back[3], point) < most * most:
             least = feature_distance(outlines, b, pose, point, least)
@@ -96,6 +99,7 @@ def core_distance(outlines, a, b, pose):
 
 def pose_of(scene, work, a, b):
     """Return the present pose (c, s, x, y) that maps a's points into b's frame."""
+    # In b's frame: a's angle relative to b, and the separation turned back by b's angle.
     x, y = separation(scene, work, NOW, a, b)
     turn = work.place[NOW, a, ANGLE] - work.place[NOW, b, ANGLE]
     c, s = math.cos(work.place[NOW, b, ANGLE]), math.sin(work.place[NOW, b, ANGLE])
@@ -148,6 +152,7 @@ def list_polygons(scene, work, pair, cutoff):
     pose = pose_of(scene, work, a, b)
     back = reversed_pose(pose)
     reach = scene.bodies[a].radius + scene.bodies[b].radius + cutoff
+    # First the features near the other body, in linear time; then all pairs of these few.
     list_features(scene, a, back[2], back[3], extent_of(scene, b) + reach, near.later)
     list_features(scene, b, pose[2], pose[3], extent_of(scene, a) + reach, near.earlier)
     room = True

@@ -46,6 +46,8 @@ def begin_step(work, clock):
     for row in range(work.tally.candidates):
         work.geometry[TRIAL, row] = work.geometry[NOW, row]
         work.candidates[row].contact_mode = OPEN
+        # Where a contact opens, friction fades over its overlap at the start. With a tiny overlap
+        # it would vanish at once, so the length has a lower bound (contact_mean.py).
         least = ITERATION_TOLERANCE * clock.tolerance
         work.interior[row].fade_length = max(-work.geometry[NOW, row].gap, least)
 
@@ -95,6 +97,7 @@ def evaluate_end(scene, work, time, step):
     evaluate_other_forces(scene, work, time, step)
     if has(scene, CONTACT_FORCE):
         add_mean_forces(scene, work, step)
+    # Reject such an end well before the contact law loses its meaning: a smaller step follows.
     return not exceeds_half_limit(scene, work)
 
 
@@ -131,6 +134,7 @@ def write_residual(scene, work, step):
     for body in range(n):
         cluster = work.clusters[body]
         cluster.force_x = cluster.force_y = cluster.rate_x = cluster.rate_y = 0.0
+    # Sum the forces and accelerations of each cluster into the record of its first body.
     for body in range(n):
         cluster = work.clusters[work.cluster[body]]
         cluster.force_x += work.force[NOW, body, X]
@@ -153,6 +157,7 @@ def write_residual(scene, work, step):
 @apart
 def assemble_other_derivatives(scene, work, clock, step):
     """Assemble the derivatives of all forces at the end of the step except those of contacts."""
+    # A velocity error displaces a body until it has decayed, or until the run ends.
     remaining = max(end_of_run(clock) - clock.time, step)
     assemble_without_contacts(scene, work, clock.time + step, remaining)
 
@@ -177,6 +182,7 @@ def solve_change(scene, work, step):
     work.tally.solves += 1
     largest = 0.0
     for body in range(work.poses.shape[0]):
+        # A change of the velocity displaces the body in this step, and later until it has decayed.
         memory = step + work.errors[body].velocity_lifetime
         for axis in range(3):
             change = work.loads[REAL, 3 * body + axis].real * scene.bodies[body].free

@@ -87,6 +87,7 @@ def typical_overlap(scene, work, step):
 
 def start_contacts(scene, work, step, overlap_scale):
     """Set δ, s and friction of all contacts as they were at the start of the step."""
+    # Start on the central path: with one product δ s = τ, none nears its boundary first.
     target = (WARM_FRACTION * overlap_scale) ** 2
     for row in range(work.tally.candidates):
         if is_included(work, row):
@@ -129,6 +130,7 @@ def iterate_once(scene, work, clock, step, target):
     change = solve_change(scene, work, step)
     if not change < math.inf:
         return -1.0, math.inf
+    # Contacts before bodies: their changes are linear in the gaps before the move.
     fraction = change_pairs(work, step, target)
     apply_change(work)
     evaluate_included(scene, work, clock.time, step)

@@ -28,6 +28,7 @@ numbers at once then do (.38 ms for 583 bodies, .52 ms with rows of three)."""
 
 def slot_of(e, row, column):
     """Return the index in ``column`` at which a row lists a column, by bisection."""
+    # Columns ascend, first those left of the diagonal, then those right of it.
     first, last = e.upper[row], e.lower[row + 1]
     if column < row:
         first, last = e.lower[row], e.upper[row]
@@ -71,6 +72,7 @@ def add_inertia(scene, work, to, body, first_axis, last_axis, step):
     for axis in range(first_axis, last_axis):
         mass = inertia(scene, body, axis) / step
         blocks[REAL_PART, to, axis, axis] += EIGENVALUES[REAL].real * mass
+        # Where the real system is written alone, nothing reads the complex parts.
         blocks[COMPLEX_RE, to, axis, axis] += EIGENVALUES[COMPLEX].real * mass
         blocks[COMPLEX_IM, to, axis, axis] += EIGENVALUES[COMPLEX].imag * mass
 
@@ -82,6 +84,7 @@ def write_momentum(scene, work, body, weights, step, both):
     leader, index = e.place[work.cluster[body]], e.place[body]
     # The row of the cluster's first body, and the column of this body.
     to = index if leader == index else block_of(e, slot_of(e, leader, index))
+    # Only drag, walls and the like: forces within the cluster cancel in its momentum balance.
     write_into(work, to, own_block(work, body), 0, 2, weights, both)
     add_inertia(scene, work, to, body, 0, 2, step)
 
@@ -169,6 +172,7 @@ def add_row(e, slot, to, left, right, sign):
 def divide_real(e, slot):
     """Multiply the block of a slot by the inverted diagonal block above it, in the real system."""
     block = block_of(e, slot)
+    # Scale 0 replaces the block, which is read as the left factor before it is written.
     multiply(e.blocks, REAL_PART, block, 0.0, REAL_PART, block, REAL_PART, e.column[slot], 1.0)
     return 0.0
 
@@ -221,6 +225,7 @@ def pivot_row(blocks, which, block, column):
     found, largest = column, -1.0
     for row in range(column, 3):
         value = number(blocks, which, block, row, column)
+        # |Re| + |Im| is within √2 of the modulus, without a square root.
         size = abs(value.real) + abs(value.imag)
         if size > largest:
             found, largest = row, size
@@ -246,11 +251,13 @@ def invert(blocks, which, block):
         rows = 4 * rows + pivot
         for j in range(3):
             swap(blocks, which, block, k, j, pivot, j)
+        # The squared modulus must neither vanish nor overflow, for its reciprocal is taken.
         value = number(blocks, which, block, k, k)
         size = value.real * value.real + value.imag * value.imag
         if not 0.0 < size < math.inf:
             return False
         reciprocal = complex(value.real / size, -value.imag / size)
+        # In place: the column of the pivot is needed no more, and becomes that of the inverse.
         put_number(blocks, which, block, k, k, complex(1.0, 0.0))
         for j in range(3):
             put_number(blocks, which, block, k, j, reciprocal * number(blocks, which, block, k, j))
@@ -277,6 +284,7 @@ def factorise_row(e, row, both):
     for slot in range(e.lower[row], e.lower[row + 1]):
         e.where[e.column[slot]] = block_of(e, slot)
     for slot in range(e.lower[row], e.upper[row]):
+        # Replace the block by L = block · U⁻¹, and subtract L times the finished row above.
         divide_real(e, slot)
         add_row(e, slot, REAL_PART, REAL_PART, REAL_PART, -1.0)
         if both:
@@ -286,6 +294,7 @@ def factorise_row(e, row, both):
             add_row(e, slot, COMPLEX_RE, COMPLEX_IM, COMPLEX_IM, 1.0)
             add_row(e, slot, COMPLEX_IM, COMPLEX_RE, COMPLEX_IM, -1.0)
             add_row(e, slot, COMPLEX_IM, COMPLEX_IM, COMPLEX_RE, -1.0)
+    # Later rows and all solutions multiply by the diagonal block's inverse.
     for which in range(2 if both else 1):
         if not invert(e.blocks, which, row):
             return False

@@ -32,6 +32,7 @@ from flocsim.state.work import CHANGE, FIRST_STAGE, NOW
 
 def sum_cluster_loads(work, which):
     """Sum the loads of each cluster into its first body's, whose row is the momentum balance."""
+    # The sum replaces the first body's own balance: mutual forces cancel, momentum is exact.
     for body in range(work.poses.shape[0]):
         leader = work.cluster[body]
         if leader != body:
@@ -74,6 +75,7 @@ def solve_both(work):
 
 def momentum_rate(scene, work, body, axis, stage, step):
     """Return mass times acceleration at a stage, M A⁻¹ (V − v₀)/h [N or N m]."""
+    # The stages obey V = v₀ + h A V̇, so that V̇ = A⁻¹ (V − v₀)/h.
     first, second, third = INVERSE[stage]
     now = work.velocity[NOW, body, axis]
     change = first * (work.velocity[FIRST_STAGE, body, axis] - now)
@@ -98,6 +100,7 @@ def sum_cluster_residuals(scene, work, stage, step):
         cluster = work.clusters[body]
         cluster.force_x = cluster.force_y = cluster.rate_x = cluster.rate_y = 0.0
     for body in range(work.poses.shape[0]):
+        # Each body adds to the record of its cluster's first body; alone, it is that body itself.
         cluster, state = work.clusters[work.cluster[body]], FIRST_STAGE + stage
         cluster.force_x += work.force[state, body, X]
         cluster.force_y += work.force[state, body, Y]
@@ -125,6 +128,7 @@ def write_residuals(scene, work, step):
     for which in range(2):
         for row in range(work.loads.shape[1]):
             work.loads[which, row] = 0.0
+    # Transform to the eigenbasis, stage by stage. Fixed bodies have no load.
     for stage in range(3):
         sum_cluster_residuals(scene, work, stage, step)
         for body in range(work.place.shape[1]):

@@ -32,6 +32,7 @@ def oriented_view(scene, time, j, i, distance, angle_i, angle_j):
 def oriented_from(scene, time, j, i, x, y, angle_j, angle_i):
     """Return the OrientedView of two bodies, j being seen from i at x, y [m]."""
     bearing = math.atan2(y, x)
+    # Angles to the line of centres do not change when the pair turns as a whole.
     one, other = angle_i - bearing, angle_j - bearing
     return oriented_view(scene, time, j, i, length_of(x, y), one, other)
 
