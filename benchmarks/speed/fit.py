@@ -16,7 +16,7 @@ from scipy import stats
 from benchmarks.pictures import PICTURES, checked, silhouettes
 from benchmarks.reporting import Table, begin, cpu_of
 from flocsim.geometry.fit import fit_mask, search
-from flocsim.geometry.fit.coverage import compiled, padded
+from flocsim.geometry.fit.coverage import padded
 from flocsim.geometry.fit.search import even_start, searched
 
 COUNTS = (4, 8, 16, 28, 64)
@@ -76,11 +76,7 @@ def paper_counts(mask, vertices):
     """(ms of the paper's motion if it counts V over the whole picture, number of counts)."""
     room, _ = padded(mask, vertices, 1.0)
     start = even_start(room, vertices, 1.0)
-    settings = search.FORCE, search.DAMPING, search.SPACING
-    steps = compiled(search.damped_descent)(
-        room, np.array(start), np.array(start), 1.0, *settings, search.TIME_STEP,
-        search.PATIENCE,
-    )  # fmt: skip
+    _, steps = search.paper_fit(room, start, 1.0)
     began = time.process_time()
     for _ in range(20):
         searched(room, start, 1.0, search.NO_STEPS)

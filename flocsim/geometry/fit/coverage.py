@@ -26,7 +26,7 @@ import numpy as np
 from flocsim.compiler import composer
 from flocsim.geometry.shapes.cores import is_near
 
-compiled = functools.partial(composer.compiled, allocates=True, what="the search for polygons")
+compiled = functools.partial(composer.compiled, what="the search for polygons")
 """A kernel of a fit, compiled on first use and kept on disk."""
 
 BARRED = 2**40
@@ -65,21 +65,19 @@ def first_pixel(least, size):
     return int(np.ceil(min(max(least, 0.0), float(size))))
 
 
-def cover(vertices, radius, shape):
-    """Counts per pixel: (edges crossed to the right are odd, edges within the radius)."""
-    odd = np.zeros(shape, np.bool_)
-    near = np.zeros(shape, np.int32)
-    count_edges(vertices, radius, odd, near)
-    return odd, near
+def no_cover(shape: tuple[int, int], inside: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Return counts per pixel (h, w) before any edge is counted: (bool, edges crossed to the right
+    are odd; int32, edges within the radius); ``inside``: outside is taken for inside."""
+    return np.full(shape, inside), np.zeros(shape, np.int32)
 
 
 def count_edges(vertices, radius, odd, near):
-    """The same into arrays (h, w) of zeros."""
+    """Count the edges of a polygon, into arrays of no_cover."""
     rows, columns = odd.shape
-    count = len(vertices)
+    count = vertices.shape[0]
     for k in range(count):
-        ax, ay = vertices[k]
-        bx, by = vertices[(k + 1) % count]
+        ax, ay = point(vertices, k)
+        bx, by = point(vertices, (k + 1) % count)
         for row in range(rows):
             for column in range(first_pixel(crossing(ax, ay, bx, by, row), columns)):
                 odd[row, column] = not odd[row, column]
@@ -110,7 +108,7 @@ def crossed_and_near(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The pixels (h, w) bool whose centres the polygon has inside, and those within the radius of
     its edges."""
-    odd, near = np.zeros(shape, bool), np.zeros(shape, np.int32)
+    odd, near = no_cover(shape)
     compiled(count_edges)(np.array(vertices), radius, odd, near)
     return odd, near > 0
 
@@ -138,8 +136,8 @@ def padded(mask: np.ndarray, count: int, radius: float) -> tuple[np.ndarray, int
 
 
 def neighbours(vertices, k):
-    after = (k + 1) % len(vertices)
-    return point(vertices, k - 1), point(vertices, k), point(vertices, after)
+    before, after = (k - 1) % vertices.shape[0], (k + 1) % vertices.shape[0]
+    return point(vertices, before), point(vertices, k), point(vertices, after)
 
 
 def row_reach(ax, ay, bx, by, row, radius):
@@ -171,7 +169,7 @@ def move_vertex(mask, odd, near, before, old, after, new, radius, keep):
     bottom = max(max(before_y, after_y), max(old_y, new_y)) + reach
     change, growth = 0, 0
     ends = before, old, after, new
-    for row in range(first_pixel(top, len(mask)), first_pixel(bottom, len(mask))):
+    for row in range(first_pixel(top, mask.shape[0]), first_pixel(bottom, mask.shape[0])):
         a1, a2 = row_reach(before_x, before_y, old_x, old_y, row, reach)
         b1, b2 = row_reach(before_x, before_y, new_x, new_y, row, reach)
         c1, c2 = row_reach(old_x, old_y, after_x, after_y, row, reach)
@@ -341,9 +339,14 @@ def point(points, k):
     return points[k, 0], points[k, 1]
 
 
+def copy_points(points, to):
+    for k in range(points.shape[0]):
+        to[k, 0], to[k, 1] = points[k, 0], points[k, 1]
+
+
 def set_bisectors(vertices, out, first, last):
     """outward_bisector of the vertices first … last, counted around the polygon, into ``out``."""
-    count = len(vertices)
+    count = vertices.shape[0]
     for k in range(first, last + 1):
         k, before, after = k % count, (k - 1) % count, (k + 1) % count
         out[k, 0], out[k, 1] = outward_bisector(
@@ -353,7 +356,7 @@ def set_bisectors(vertices, out, first, last):
 
 def set_edge_sums(sums, radius, vertices, out, edges, first, last):
     """edge_sum of the edges from the vertices first … last into ``edges``; the largest of them."""
-    count = len(vertices)
+    count = vertices.shape[0]
     largest = -BARRED
     for k in range(first, last + 1):
         k, after = k % count, (k + 1) % count

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from flocsim.errors import ShapeError, UsageError
 from flocsim.fields import is_number
-from flocsim.geometry.fit.coverage import compiled, crossed_and_near, padded, wrong_pixels
+from flocsim.geometry.fit.coverage import crossed_and_near, padded, wrong_pixels
 from flocsim.geometry.fit.search import (
     AREA,
     COARSE,
@@ -189,7 +189,7 @@ def _fit_polygon(mask, count, radius, method, preserve_area, inscribed):
         points = pattern_fit(room, count, radius, weights)
     else:
         points = even_start(room, count, radius)
-        points = paper_fit(room, points, radius) if method == "paper" else points
+        points = paper_fit(room, points, radius)[0] if method == "paper" else points
     vertices = (points - margin) * (1.0, -1.0)
     shape = SpheroPolygon(vertices, radius)
     off = shape.area - mask.sum()
@@ -253,7 +253,7 @@ def _settled(mask, vertices, radius, excess):
     perimeter = np.hypot(*(np.roll(points, -1, axis=0) - points).T).sum() + 2.0 * np.pi * radius
     for share in (1.0, 0.5, 0.25):
         moved = np.array(points)
-        simple = compiled(simple_inset)(moved, float(share * excess / perimeter))
+        simple = simple_inset(moved, share * excess / perimeter)
         if simple and wrong_pixels(mask, [moved * (1.0, -1.0)], radius)[0] <= wrong:
             return moved * (1.0, -1.0)
     return vertices

@@ -16,6 +16,7 @@ two or three sums along edges.
 
 from collections.abc import Sequence
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from flocsim.geometry.fit.coverage import (
     BARRED,
     POSSIBLE,
     compiled,
+    copy_points,
     edge_sum,
     leaves_room,
     outward_bisector,
@@ -73,40 +75,76 @@ PIXEL = 0.4
 """The least step [px] at the end: below it hardly a pixel changes."""
 
 
-def edge_costs(sums, radius, points, out, costs):
-    """edge_sum of every edge from place k, point i to the place 1 + a further on, point j, into
-    costs[k, a, i, j]; points (places, choices, 2), out (places, 2) the directions there."""
-    size, choices = points.shape[:2]
-    shape = sums.shape[0], sums.shape[1] - 1
-    inside = np.empty((size, choices), np.bool_)
+class Ring(NamedTuple):
+    """Places around an outline, the points to choose from at each, and ways round through N of
+    them."""
+
+    points: np.ndarray  # (places, choices, 2) [px]
+    costs: np.ndarray  # [k, a, i, j] of edges from place k, point i to place k + 1 + a, point j
+    least: np.ndarray  # (N + 1, places + 1, choices): cost of the cheapest way so far
+    came: np.ndarray  # (N + 1, places + 1, choices): the last edge of that, a · choices + i
+    places: np.ndarray  # (N,) of the cheapest way round
+    picks: np.ndarray  # (N,): the points picked there
+
+
+def ring_of(points: np.ndarray, count: int, longest: int) -> Ring:
+    """Return a Ring of points (places, choices, 2) for ways of ``count`` edges, each at most
+    ``longest`` places long."""
+    size, choices, _ = points.shape
+    costs = np.empty((size, longest, choices, choices), np.int64)
+    least, came = np.empty((2, count + 1, size + 1, choices), np.int64)
+    places, picks = np.empty((2, count), np.int64)
+    return Ring(points, costs, least, came, places, picks)
+
+
+def scratch(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return arrays for a search of N vertices to overwrite: other vertices (N, 2), directions
+    (N, 2), sums of edges (N,)."""
+    return *np.empty((2, count, 2)), np.empty(count, np.int64)
+
+
+def choice(points, k, i):
+    return points[k, i, 0], points[k, i, 1]
+
+
+def total(edges):
+    added = 0
+    for k in range(edges.shape[0]):
+        added += edges[k]
+    return added
+
+
+def edge_costs(sums, radius, out, ring):
+    """edge_sum of every edge of a ring, into its costs; out (places, 2) the directions there."""
+    size, longest, choices, _ = ring.costs.shape
+    shape, room = (sums.shape[0], sums.shape[1] - 1), radius + 1.0
     for k in range(size):
-        for i in range(choices):
-            inside[k, i] = leaves_room(shape, point(points[k], i), radius + 1.0)
-    for k in range(size):
-        for ahead in range(costs.shape[1]):
+        for ahead in range(longest):
             to = (k + ahead + 1) % size
             for i in range(choices):
                 for j in range(choices):
+                    a, b = choice(ring.points, k, i), choice(ring.points, to, j)
                     cost = BARRED
-                    if inside[k, i] and inside[to, j]:
-                        a, b = point(points[k], i), point(points[to], j)
+                    if leaves_room(shape, a, room) and leaves_room(shape, b, room):
                         cost = edge_sum(sums, radius, a, point(out, k), b, point(out, to))
-                    costs[k, ahead, i, j] = cost
+                    ring.costs[k, ahead, i, j] = cost
 
 
-def best_ring(costs, start, spread, places, picks):
-    """The cheapest way round with len(places) vertices, one of them at the place ``start``.
+def best_way(ring, start, spread):
+    """The cheapest way round a ring with N vertices, one of them at the place ``start``.
 
     Its places and the points picked there go into ``places`` and ``picks``.  Returns its cost,
     at least POSSIBLE if there is no way round.
     """
-    size, longest, choices = costs.shape[:3]
-    count = len(places)
-    least = np.empty((count + 1, size + 1, choices), np.int64)
-    came = np.empty((count + 1, size + 1, choices), np.int64)
+    size, longest, choices, _ = ring.costs.shape
+    count = ring.places.shape[0]
+    least, came = ring.least, ring.came
     best = POSSIBLE
     for first in range(choices):
-        least[:] = BARRED
+        for used in range(count + 1):
+            for place in range(size + 1):
+                for j in range(choices):
+                    least[used, place, j] = BARRED
         least[0, 0, first] = 0
         for place in range(1, size + 1):
             even = place * count // size
@@ -122,7 +160,7 @@ def best_ring(costs, start, spread, places, picks):
                         behind = place - ahead - 1
                         k = (start + behind) % size
                         for i in range(choices):
-                            cost = least[used - 1, behind, i] + costs[k, ahead, i, j]
+                            cost = least[used - 1, behind, i] + ring.costs[k, ahead, i, j]
                             if cost < min(cheapest, POSSIBLE):
                                 cheapest, way = cost, ahead * choices + i
                     least[used, place, j], came[used, place, j] = cheapest, way
@@ -132,56 +170,63 @@ def best_ring(costs, start, spread, places, picks):
             for used in range(count, 0, -1):
                 way = came[used, place, j]
                 place, j = place - way // choices - 1, way % choices
-                places[used - 1], picks[used - 1] = (start + place) % size, j
+                ring.places[used - 1], ring.picks[used - 1] = (start + place) % size, j
     return best
 
 
-def descend(sums, vertices, radius, directions, steps):
+def move_all(sums, vertices, moved, out, edges, ring, radius, directions, steps):
+    """Do what descend does; ``directions`` (choices, 2) are those of all choices of a vertex."""
+    last = vertices.shape[0] - 1
+    lowest = POSSIBLE
+    for turn in range(steps.shape[0]):
+        while True:
+            set_bisectors(vertices, out, 0, last)
+            set_edge_sums(sums, radius, vertices, out, edges, 0, last)
+            for k in range(last + 1):
+                for i in range(directions.shape[0]):
+                    for axis in range(2):
+                        step = steps[turn] * directions[i, axis]
+                        ring.points[k, i, axis] = vertices[k, axis] + step
+            edge_costs(sums, radius, out, ring)
+            # With the directions of what was found, its own sum can be a little higher.
+            lowest = min(lowest, total(edges))
+            found = best_way(ring, 0, 0)
+            if found >= lowest:
+                break
+            for k in range(last + 1):
+                place = ring.places[k]
+                moved[place, 0], moved[place, 1] = choice(ring.points, place, ring.picks[k])
+            if not is_open(moved, 2.0 * radius):
+                break
+            lowest = found
+            copy_points(moved, vertices)
+
+
+def descend(
+    sums: np.ndarray, vertices: np.ndarray, radius: float, directions: np.ndarray, steps: np.ndarray
+) -> None:
     """Move all vertices at once along ``directions``, or leave them, while that lowers the sum.
 
     vertices (N, 2): changed in place; steps [px].  The polygon stays simple and open.
     """
-    count, choices = len(vertices), len(directions) + 1
-    points, out = np.empty((count, choices, 2)), np.empty((count, 2))
-    costs = np.empty((count, 1, choices, choices), np.int64)
-    places, picks = np.empty(count, np.int64), np.empty(count, np.int64)
-    moved, edges = np.empty((count, 2)), np.empty(count, np.int64)
-    lowest = POSSIBLE
-    for step in steps:
-        while True:
-            set_bisectors(vertices, out, 0, count - 1)
-            set_edge_sums(sums, radius, vertices, out, edges, 0, count - 1)
-            points[:, 0] = vertices
-            for i in range(1, choices):
-                points[:, i] = vertices + step * directions[i - 1]
-            edge_costs(sums, radius, points, out, costs)
-            # With the directions of what was found, its own sum can be a little higher.
-            lowest = min(lowest, edges.sum())
-            found = best_ring(costs, 0, 0, places, picks)
-            if found >= lowest:
-                break
-            for k in range(count):
-                moved[places[k]] = points[places[k], picks[k]]
-            if not is_open(moved, 2.0 * radius):
-                break
-            lowest = found
-            vertices[:] = moved
+    # The first choice of each vertex is where it is.
+    count, choices = len(vertices), np.vstack([np.zeros(2), directions])
+    ring = ring_of(np.empty((count, *choices.shape)), count, longest=1)
+    compiled(move_all)(sums, vertices, *scratch(count), ring, radius, choices, steps)
 
 
-def chosen(sums, points, out, radius, longest, spread, start, rounds, vertices):
-    """The best ring of points (places, 1, 2) into ``vertices``; its cost."""
-    count = len(vertices)
-    costs = np.empty((len(points), longest, 1, 1), np.int64)
-    edge_costs(sums, radius, points, out, costs)
-    places, picks = np.empty(count, np.int64), np.empty(count, np.int64)
-    cost = POSSIBLE
+def chosen(sums, ring, out, radius, spread, start, rounds, vertices):
+    """The points (places, 1, 2) of the best way round a ring into ``vertices``; its cost."""
+    edge_costs(sums, radius, out, ring)
+    count, cost = vertices.shape[0], POSSIBLE
     for _ in range(rounds):
-        cost = best_ring(costs, start, spread, places, picks)
+        cost = best_way(ring, start, spread)
         if cost >= POSSIBLE:
             break
-        start = places[count // 2]
+        start = ring.places[count // 2]
     if cost < POSSIBLE:
-        vertices[:] = points[places, 0]
+        for k in range(count):
+            vertices[k, 0], vertices[k, 1] = choice(ring.points, ring.places[k], 0)
     return cost
 
 
@@ -205,8 +250,8 @@ def split_outline(
     longest = min(size // 2, max(2, LONGEST * size // count))
     start = int(np.argmax(np.hypot(*(points - points.mean(axis=0)).T)))
     vertices = np.empty((count, 2))
-    drawn = np.ascontiguousarray((points - radius * out)[:, None])
-    cost = compiled(chosen)(sums, drawn, out, radius, longest, SPREAD, start, ROUNDS, vertices)
+    ring = ring_of(np.ascontiguousarray((points - radius * out)[:, None]), count, longest)
+    cost = compiled(chosen)(sums, ring, out, radius, SPREAD, start, ROUNDS, vertices)
     return vertices if cost < POSSIBLE else None
 
 
@@ -237,11 +282,11 @@ def put_into_edge(vertices, k, edge, x, y):
     return k
 
 
-def proposed(vertices, before, k, after, step, draws):
+def proposed(vertices, before, k, after, step, draws, move):
     """A place near vertex k: a step in any direction, or along one of its edges."""
     x, y = vertices[k, 0], vertices[k, 1]
-    one, other = step * draws[0], step * draws[1]
-    share = (draws[4] - JUMPS) / SLIDES
+    one, other = step * draws[move, 0], step * draws[move, 1]
+    share = (draws[move, 4] - JUMPS) / SLIDES
     if share >= 1.0:
         return x + one, y + other
     end = before if share < 0.5 else after
@@ -251,21 +296,20 @@ def proposed(vertices, before, k, after, step, draws):
     return x + one * ux - other * uy, y + one * uy + other * ux
 
 
-def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
+def annealed(sums, vertices, kept, out, edges, best, radius, pixels, draws, heats, steps):
     """Anneal ``vertices``, which are changed; the polygon of the least sum goes into ``best``.
     Returns that sum.
 
-    pixels: the mask's; draws: random_moves of one run; heats, steps: at the start and at the end.
+    kept, out, edges: scratch; pixels: the mask's; draws: random_moves of one run; heats, steps: at
+    the start and at the end.
     """
-    count, moves = len(vertices), len(draws)
+    count, moves = vertices.shape[0], draws.shape[0]
     shape = sums.shape[0], sums.shape[1] - 1
     gap, room, last = 2.0 * radius, radius + 1.0, count - 1
-    out, kept = np.empty((count, 2)), np.empty((count, 2))
-    edges = np.empty(count, np.int64)
     set_bisectors(vertices, out, 0, last)
     set_edge_sums(sums, radius, vertices, out, edges, 0, last)
-    least = edges.sum()
-    best[:] = vertices
+    least = total(edges)
+    copy_points(vertices, best)
     heat = heats[0]
     cooling, shrinking = (heats[1] / heat) ** (1.0 / moves), (steps[1] / steps[0]) ** (1.0 / moves)
     step = steps[0]
@@ -283,7 +327,7 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
             y = 0.5 * (vertices[start, 1] + vertices[stop, 1]) + 2.0 * step * draws[move, 1]
         else:
             edge, start, stop = before, before, after
-            x, y = proposed(vertices, before, k, after, step, draws[move])
+            x, y = proposed(vertices, before, k, after, step, draws, move)
         if not leaves_room(shape, (x, y), room):
             continue
         new, one, two = (x, y), point(vertices, start), point(vertices, stop)
@@ -300,7 +344,7 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
         # Kept with the probability exp(−added/heat).
         if added > heat * draws[move, 3]:
             continue
-        kept[:] = vertices
+        copy_points(vertices, kept)
         if jump:
             place = put_into_edge(vertices, k, edge, x, y)
             # What was the vertex before k begins the edge that closes the gap.
@@ -319,16 +363,16 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
             set_bisectors(vertices, out, first, final)
             sound = set_edge_sums(sums, radius, vertices, out, edges, first - 1, final) < BARRED
             if not sound:
-                vertices[:] = kept
+                copy_points(kept, vertices)
                 set_bisectors(vertices, out, first, final)
                 set_edge_sums(sums, radius, vertices, out, edges, first - 1, final)
         if not sound:
-            vertices[:] = kept
+            copy_points(kept, vertices)
             continue
-        now = edges.sum()
+        now = total(edges)
         if now < least:
             least = now
-            best[:] = vertices
+            copy_points(vertices, best)
             if least <= -pixels:
                 break
     return least
@@ -348,9 +392,9 @@ def annealed_runs(
     moves = random_moves()
 
     def run(start: np.ndarray, draws: np.ndarray, heat: float) -> tuple[int, np.ndarray]:
-        vertices, best = np.array(start), np.empty_like(start)
-        heats = heat, COOLED * heat
-        least = compiled(annealed)(sums, vertices, best, radius, pixels, draws, heats, steps)
+        best, heats = np.empty_like(start), (heat, COOLED * heat)
+        arrays = np.array(start), *scratch(len(start)), best
+        least = compiled(annealed)(sums, *arrays, radius, pixels, draws, heats, steps)
         return least, best
 
     found = [run(start, moves[k], heat) for k, start in enumerate(starts)]

@@ -23,11 +23,13 @@ import numpy as np
 
 from flocsim.geometry.fit.coverage import (
     compiled,
+    copy_points,
+    count_edges,
     count_wrong,
-    cover,
     leaves_room,
     move_vertex,
     neighbours,
+    no_cover,
     running_sums,
 )
 from flocsim.geometry.fit.global_search import annealed_runs, descend, split_outline
@@ -124,10 +126,10 @@ def inset(points: np.ndarray, mask: np.ndarray, depth: float) -> np.ndarray:
     Points whose polygon is not simple are reordered, or a ring inside the mask takes their place.
     """
     drawn = np.array(points)
-    if compiled(simple_inset)(drawn, float(depth)):
+    if simple_inset(drawn, depth):
         return drawn
     drawn = ring_inside(mask, len(points))
-    compiled(simple_inset)(drawn, float(depth))
+    simple_inset(drawn, depth)
     return drawn
 
 
@@ -149,20 +151,24 @@ def telling_points(outline: np.ndarray, count: int) -> np.ndarray:
     The point that spans the smallest triangle with its neighbours is left out, again and again.
     """
     points = outline if len(outline) >= 2 * count else even_points(outline, 2 * count)
-    areas = np.empty(len(points))
-    compiled(leave_out)(points, count, areas)
+    areas, places = np.empty(len(points)), np.arange(len(points))
+    compiled(leave_out)(points, count, areas, np.roll(places, 1), np.roll(places, -1))
     return points[np.isfinite(areas)]
 
 
-def leave_out(points, count, areas):
-    """Twice the areas of the triangles of all but `count` points, inf where one is left out."""
-    size = len(points)
-    before, after = np.arange(size) - 1, np.arange(size) + 1
-    before[0], after[size - 1] = size - 1, 0
+def leave_out(points, count, areas, before, after):
+    """Twice the areas of the triangles of all but `count` points, inf where one is left out.
+
+    before, after: the places of each point's neighbours, which change.
+    """
+    size = points.shape[0]
     for k in range(size):
         areas[k] = triangle(points, before[k], k, after[k])
     for _ in range(size - count):
-        k = np.argmin(areas)
+        k = 0
+        for other in range(1, size):
+            if areas[other] < areas[k]:
+                k = other
         areas[k] = np.inf
         left, right = before[k], after[k]
         after[left], before[right] = right, left
@@ -182,7 +188,7 @@ def step_vertex(mask, odd, near, vertices, k, radius, directions, step, excess, 
     """
     before, here, after = neighbours(vertices, k)
     best, least, grown = here, 0, 0
-    for direction in range(len(directions)):
+    for direction in range(directions.shape[0]):
         x, y = here[0] + step * directions[direction, 0], here[1] + step * directions[direction, 1]
         if not leaves_room(mask.shape, (x, y), radius + 1.0):
             continue
@@ -196,22 +202,21 @@ def step_vertex(mask, odd, near, vertices, k, radius, directions, step, excess, 
     return least, grown
 
 
-def pattern_search(mask, vertices, radius, directions, steps, weights, hole):
+def pattern_search(mask, vertices, odd, near, waiting, radius, directions, steps, weights):
     """Move vertices along `directions` (k, 2) by shrinking `steps` [px] while that lowers.
 
-    mask: (h, w) bool; vertices: (N, 2), simple, changed in place; hole: whether they go around a
-    hole, what lies outside of it being covered.  A vertex whose steps all failed rests until one
-    nearby moves.  Returns the objective, V for PLAIN weights.
+    mask: (h, w) bool; vertices: (N, 2), simple, changed in place; odd, near: no_cover, where
+    vertices go around a hole with all inside; waiting: (N,) bool.  A vertex whose steps all failed
+    rests until one nearby moves.  Returns the objective, V for PLAIN weights.
     """
-    odd, near = cover(vertices, radius, mask.shape)
-    if hole:
-        odd = ~odd
+    count_edges(vertices, radius, odd, near)
     wrong, excess = count_wrong(mask, odd, near)
     objective = weighed(wrong, excess, weights)
-    count = len(vertices)
-    waiting = np.empty(count, np.bool_)
-    for step in steps:
-        waiting[:] = True
+    count = vertices.shape[0]
+    for turn in range(steps.shape[0]):
+        step = steps[turn]
+        for k in range(count):
+            waiting[k] = True
         k, rested = 0, 0
         while rested < count:
             change = 0
@@ -238,10 +243,13 @@ def searched(
     weights: tuple[int, int] = PLAIN,
     hole: bool = False,
 ) -> tuple[np.ndarray, int]:
-    """pattern_search of a start, which is left as it is: (vertices, objective)."""
-    vertices = np.array(start)
-    search = compiled(pattern_search)
-    return vertices, int(search(mask, vertices, radius, DIRECTIONS, steps, weights, hole))
+    """pattern_search of a start, which is left as it is: (vertices, objective).
+
+    hole: whether the vertices go around a hole, what lies outside of it being covered.
+    """
+    vertices, search = np.array(start), compiled(pattern_search)
+    arrays = vertices, *no_cover(mask.shape, inside=hole), np.empty(len(start), bool)
+    return vertices, int(search(mask, *arrays, radius, DIRECTIONS, steps, weights))
 
 
 def pattern_fit(
@@ -260,11 +268,11 @@ def pattern_fit(
     if count > 2:
         for start, _ in _lowest(trials, LOWERED):
             vertices = np.array(start)
-            compiled(descend)(sums, vertices, radius, DIRECTIONS, DESCENT)
+            descend(sums, vertices, radius, DIRECTIONS, DESCENT)
             trials.append(counted(vertices))
         begin = [vertices for vertices, _ in _lowest(trials, LOWERED)]
         for vertices in annealed_runs(sums, begin, radius, int(mask.sum())):
-            compiled(descend)(sums, vertices, radius, DIRECTIONS, FINE)
+            descend(sums, vertices, radius, DIRECTIONS, FINE)
             trials.append(counted(vertices))
     else:
         trials += [searched(mask, start, radius, COARSE, weights) for start, _ in trials]
@@ -349,38 +357,43 @@ def advance(mask, odd, near, vertices, velocities, k, radius, step):
     y = vertices[k, 1] + step * velocities[k, 1]
     room = leaves_room(mask.shape, (x, y), radius + SPACING + 1.0)
     if not (room and stays_simple(vertices, k, x, y)):
-        velocities[k] = 0.0
+        velocities[k, 0] = velocities[k, 1] = 0.0
         return 0
     vertices[k, 0], vertices[k, 1] = x, y
     change, _ = move_vertex(mask, odd, near, before, here, after, (x, y), radius, True)
     return change
 
 
-def damped_descent(mask, vertices, best, radius, force, damping, spacing, step, patience):
+def damped_descent(
+    mask, odd, near, vertices, velocities, best, radius, force, damping, spacing, step, patience
+):
     """The vertices (N, 2) of the least V on the way of the damped motion into ``best``; the steps
-    taken."""
-    odd, near = cover(vertices, radius, mask.shape)
+    taken.
+
+    odd, near: no_cover; velocities: zeros (N, 2).
+    """
+    count_edges(vertices, radius, odd, near)
     wrong = least = count_wrong(mask, odd, near)[0]
-    best[:] = vertices
-    velocities = np.zeros_like(vertices)
+    copy_points(vertices, best)
     steps = waited = 0
     while waited < patience and least > 0:
-        for k in range(len(vertices)):
+        for k in range(vertices.shape[0]):
             across, down = gradient(mask, odd, near, vertices, k, radius, spacing)
             velocities[k, 0] -= step * (force * across + damping * velocities[k, 0])
             velocities[k, 1] -= step * (force * down + damping * velocities[k, 1])
-        for k in range(len(vertices)):
+        for k in range(vertices.shape[0]):
             wrong += advance(mask, odd, near, vertices, velocities, k, radius, step)
         steps, waited = steps + 1, waited + 1
         if wrong < least:
-            best[:], least, waited = vertices, wrong, 0
+            copy_points(vertices, best)
+            least, waited = wrong, 0
     return steps
 
 
-def paper_fit(mask: np.ndarray, start: np.ndarray, radius: float) -> np.ndarray:
-    """The vertices (N, 2) that the paper's motion leads to from a start, which it leaves alone."""
-    vertices, best = np.array(start), np.empty_like(start)
-    compiled(damped_descent)(
-        mask, vertices, best, radius, FORCE, DAMPING, SPACING, TIME_STEP, PATIENCE
-    )
-    return best
+def paper_fit(mask: np.ndarray, start: np.ndarray, radius: float) -> tuple[np.ndarray, int]:
+    """The vertices (N, 2) that the paper's motion leads to from a start, which it leaves alone, and
+    the steps taken."""
+    vertices, velocities, best = np.array(start), np.zeros_like(start), np.empty_like(start)
+    arrays = *no_cover(mask.shape), vertices, velocities, best
+    settings = FORCE, DAMPING, SPACING, TIME_STEP, PATIENCE
+    return best, compiled(damped_descent)(mask, *arrays, radius, *settings)

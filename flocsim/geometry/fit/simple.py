@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from flocsim.geometry.fit.coverage import compiled
+from flocsim.geometry.fit.coverage import compiled, neighbours, point
 from flocsim.geometry.shapes.cores import segment_distance2, segments_cross
 
 CLEARANCE = 0.01
@@ -15,13 +15,13 @@ def edge_is_clear(vertices, start, stop, moved, x, y):
     The vertex `moved`, one of the two, counts as being at (x, y).
     """
     limit = CLEARANCE * CLEARANCE
-    count = len(vertices)
-    ax, ay = (x, y) if start == moved else (vertices[start, 0], vertices[start, 1])
-    bx, by = (x, y) if stop == moved else (vertices[stop, 0], vertices[stop, 1])
+    count = vertices.shape[0]
+    ax, ay = (x, y) if start == moved else point(vertices, start)
+    bx, by = (x, y) if stop == moved else point(vertices, stop)
     if (bx - ax) ** 2 + (by - ay) ** 2 < limit:
         return False
     for k in range(count):
-        cx, cy = vertices[k]
+        cx, cy = point(vertices, k)
         if k in (start, stop):
             continue
         if segment_distance2(cx, cy, ax, ay, bx, by) < limit:
@@ -29,7 +29,7 @@ def edge_is_clear(vertices, start, stop, moved, x, y):
         following = (k + 1) % count
         if following in (start, stop):
             continue
-        dx, dy = vertices[following]
+        dx, dy = point(vertices, following)
         if segment_distance2(x, y, cx, cy, dx, dy) < limit:
             return False
         if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
@@ -38,7 +38,7 @@ def edge_is_clear(vertices, start, stop, moved, x, y):
 
 
 def stays_simple(vertices, k, x, y):
-    count = len(vertices)
+    count = vertices.shape[0]
     before, after = (k - 1) % count, (k + 1) % count
     return edge_is_clear(vertices, before, k, k, x, y) and edge_is_clear(
         vertices, k, after, k, x, y
@@ -47,7 +47,7 @@ def stays_simple(vertices, k, x, y):
 
 def all_clear(vertices):
     """Whether no edges cross and every vertex is clear of the edges that are not its own."""
-    for k in range(len(vertices)):
+    for k in range(vertices.shape[0]):
         if not stays_simple(vertices, k, vertices[k, 0], vertices[k, 1]):
             return False
     return True
@@ -58,7 +58,7 @@ def edge_is_open(vertices, k, gap):
 
     The polygon lies on the right hand of its walk.  Edges that meet are not facing each other.
     """
-    count = len(vertices)
+    count = vertices.shape[0]
     before, after = (k - 1) % count, (k + 1) % count
     clear, limit = CLEARANCE * CLEARANCE, gap * gap
     ax, ay = vertices[k, 0], vertices[k, 1]
@@ -102,7 +102,7 @@ def edge_is_open(vertices, k, gap):
 
 def is_open(vertices, gap):
     """Whether the polygon is simple, and no two of its edges face each other outside by < gap."""
-    for k in range(len(vertices)):
+    for k in range(vertices.shape[0]):
         if not edge_is_open(vertices, k, gap):
             return False
     return True
@@ -124,15 +124,15 @@ def untangle(vertices):
     Of every crossing pair of edges the part between is reversed, which shortens the polygon.
     Points on one line can seem to cross for ever, by rounding: the rounds are counted.
     """
-    count = len(vertices)
+    count = vertices.shape[0]
     for _ in range(count):
         crossed = False
         for first in range(count - 2):
             for second in range(first + 2, count - (first == 0)):
-                ax, ay = vertices[first]
-                bx, by = vertices[first + 1]
-                cx, cy = vertices[second]
-                dx, dy = vertices[(second + 1) % count]
+                ax, ay = point(vertices, first)
+                bx, by = point(vertices, first + 1)
+                cx, cy = point(vertices, second)
+                dx, dy = point(vertices, (second + 1) % count)
                 if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
                     reverse(vertices, first + 1, second)
                     crossed = True
@@ -142,23 +142,22 @@ def untangle(vertices):
 
 def bisector(vertices, k):
     """Unit bisector of the corner k, to the right hand of a walk: inwards for trace_outline's."""
-    count = len(vertices)
-    x, y = vertices[k]
-    ux, uy = x - vertices[k - 1, 0], y - vertices[k - 1, 1]
-    wx, wy = vertices[(k + 1) % count, 0] - x, vertices[(k + 1) % count, 1] - y
+    (last_x, last_y), (x, y), (next_x, next_y) = neighbours(vertices, k)
+    ux, uy = x - last_x, y - last_y
+    wx, wy = next_x - x, next_y - y
     before, after = max(np.hypot(ux, uy), 1e-12), max(np.hypot(wx, wy), 1e-12)
     nx, ny = -uy / before - wy / after, ux / before + wx / after
     length = max(np.hypot(nx, ny), 1e-12)
     return nx / length, ny / length
 
 
-def draw_in(vertices, depth):
-    """Move every vertex by `depth` [px] along its bisector, in place.
+def draw_in(vertices, depth, inwards):
+    """Move every vertex by `depth` [px] along its bisector, in place; the bisectors go into
+    ``inwards`` (N, 2).
 
     Where the polygon would not stay simple, by half of it, or not at all.
     """
-    count = len(vertices)
-    inwards = np.empty((count, 2))
+    count = vertices.shape[0]
     for k in range(count):
         inwards[k, 0], inwards[k, 1] = bisector(vertices, k)
     for k in range(count):
@@ -170,17 +169,22 @@ def draw_in(vertices, depth):
                 break
 
 
-def simple_inset(vertices, depth):
-    """Untangle the polygon and draw it in by `depth` [px], in place; whether that succeeded."""
+def untangle_and_draw_in(vertices, depth, inwards):
+    """Do what simple_inset does; ``inwards`` (N, 2) is overwritten."""
     if not all_clear(vertices):
         untangle(vertices)
         if not all_clear(vertices):
             return False
-    draw_in(vertices, depth)
+    draw_in(vertices, depth, inwards)
     return True
+
+
+def simple_inset(vertices: np.ndarray, depth: float) -> bool:
+    """Untangle the polygon and draw it in by `depth` [px], in place; whether that succeeded."""
+    return bool(compiled(untangle_and_draw_in)(vertices, float(depth), np.empty_like(vertices)))
 
 
 def is_simple(vertices: np.ndarray) -> bool:
     """Whether no edges cross or nearly touch: simple_inset leaves such a polygon as it is."""
     drawn = np.array(vertices)
-    return bool(compiled(simple_inset)(drawn, 0.0)) and np.array_equal(drawn, vertices)
+    return simple_inset(drawn, 0.0) and np.array_equal(drawn, vertices)
