@@ -45,8 +45,8 @@ def is_on() -> bool:
         import numba
 
         with replacements():
-            twice = typed_once(numba.njit(lambda x: 2.0 * x, **pipelines(False, False)))
-            whole = numba.cfunc("f8(f8)", **pipelines(True, False))
+            twice = typed_once(numba.njit(lambda x: 2.0 * x, **pipelines(False)))
+            whole = numba.cfunc("f8(f8)", **pipelines(True))
             text = whole(lambda x: twice(x) + twice(1.0)).inspect_llvm()
         forget([twice])
         return text.count("\ndefine") >= 3  # the unit, its wrapper and what it calls
@@ -54,14 +54,14 @@ def is_on() -> bool:
         return False
 
 
-def options(unit: bool, allocates: bool) -> dict[str, Any]:
+def options(unit: bool) -> dict[str, Any]:
     """Return options of numba.cfunc for the function that a unit begins with, else of numba.njit
     for those that are only linked into it."""
-    return pipelines(unit, allocates) if is_on() else {}
+    return pipelines(unit) if is_on() else {}
 
 
 @functools.cache
-def pipelines(unit: bool, allocates: bool) -> dict[str, Any]:
+def pipelines(unit: bool) -> dict[str, Any]:
     """Return the options that `options` gives where the accelerator is on."""
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -102,7 +102,7 @@ def pipelines(unit: bool, allocates: bool) -> dict[str, Any]:
     class Lowering(NativeLowering):
         """numba's last pass, into a library of ours."""
 
-        _name = f"flocsim_lowering_{unit}_{allocates}"
+        _name = f"flocsim_lowering_{unit}"
 
         def run_pass(self, state):
             name = state.func_id.func_qualname
@@ -113,9 +113,7 @@ def pipelines(unit: bool, allocates: bool) -> dict[str, Any]:
         """numba's usual passes with another last one."""
 
         def define_pipelines(self):
-            plain = not allocates and not any(
-                map(inspect.iscode, self.state.func_id.code.co_consts)
-            )
+            plain = not any(map(inspect.iscode, self.state.func_id.code.co_consts))
             needless = (ANNOTATIONS, *(NEEDLESS_PASSES if plain else ()))
             passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
             passes.passes = [
@@ -127,9 +125,8 @@ def pipelines(unit: bool, allocates: bool) -> dict[str, Any]:
             return [passes]
 
     unwrapped = {} if unit else {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    # Where nothing is allocated no references are counted, which would take most of the time.
-    uncounted = {} if allocates else {"_nrt": False}
-    return {"pipeline_class": Compiler, **unwrapped, **uncounted}
+    # As nothing is allocated no references are counted, which would take most of the time.
+    return {"pipeline_class": Compiler, "_nrt": False, **unwrapped}
 
 
 def typed_once(dispatcher: Any) -> Any:

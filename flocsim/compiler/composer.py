@@ -27,19 +27,13 @@ _composed: dict = {}
 
 
 def compose(
-    entry: Callable,
-    fillings: dict[Callable, Callable],
-    *,
-    jit: bool = True,
-    allocates: bool = False,
-    what: str = "",
+    entry: Callable, fillings: dict[Callable, Callable], *, jit: bool = True, what: str = ""
 ) -> Any:
     """Return the driver ``entry`` with its hooks filled, as one function.
 
     Parameters: ``entry``, a plain function; ``fillings``, {hook of flocsim.hooks.HOOKS: plain
     function}; ``jit=False`` links the plain Python functions, for debugging and reference;
-    ``allocates``, whether any of the functions makes an array, for itself; ``what`` it is in words,
-    for who waits while it is compiled; "": nothing is said.
+    ``what`` it is in words, for who waits while it is compiled; "": nothing is said.
     Raises KernelError for kernels that capture variables or read globals that may change.
     """
     # Cloned at once: what is reached later, compiled or not, is what it is now.
@@ -47,17 +41,17 @@ def compose(
     if not jit:
         return linked
     refuse_no_compiler()
-    name = f"flocsim_scene_{fingerprint(entry, fillings, options_text(allocates), linked)}"
+    name = f"flocsim_scene_{fingerprint(entry, fillings, options_text(), linked)}"
     if name not in _composed:
-        _composed[name] = Engine(linked, name, allocates, what)
+        _composed[name] = Engine(linked, name, what)
     return _composed[name]
 
 
 @functools.cache
-def compiled(entry: Callable, *, allocates: bool = False, what: str = "") -> Callable:
+def compiled(entry: Callable, *, what: str = "") -> Callable:
     """Return the same of a function without hooks, looked at once: what it reaches is what it was
     then."""
-    return compose(entry, {}, allocates=allocates, what=what)
+    return compose(entry, {}, what=what)
 
 
 def is_on_disk(driver: Any) -> bool:

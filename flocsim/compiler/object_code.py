@@ -1,7 +1,7 @@
 """Machine code as an object file: made of what numba compiles, loaded by LLVM alone.
 
-Loading numba, and all that it registers, takes longer than a short run; a function that allocates
-nothing needs no more of it than an object file and the name of its entry.
+Loading numba, and all that it registers, takes longer than a short run; a compiled function needs
+no more of it than an object file and the name of its entry.
 
 A compiled function is called as a C function of two addresses: that at which its answer goes, and
 that of its arguments. It returns 0, or 1 where it has raised an exception.

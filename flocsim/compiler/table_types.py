@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, from_dtype, types
+from numba import from_dtype, types
 
 # The class that numba.extending.infer_getattr, which is public, takes subclasses of.
 from numba.core.typing.templates import AttributeTemplate
@@ -105,27 +105,24 @@ def words_in(kind: Any) -> int:
     """Return how many words of a table hold a value of a numba type."""
     if isinstance(kind, types.BaseTuple):
         return sum(words_in(each) for each in parts_of(kind))
-    return 1 + kind.ndim if isinstance(kind, types.Array) else getattr(kind, "words", 1)
+    return getattr(kind, "words", 1)
 
 
-def type_of(value: Any, whole: bool = False, sizes: tuple[int, ...] = ()) -> Any:
-    """Return the numba type of an argument; ``whole``: arrays are those that numba has;
-    ``sizes``: those that an array always has."""
+def type_of(value: Any, sizes: tuple[int, ...] = ()) -> Any:
+    """Return the numba type of an argument; ``sizes``: those that an array always has."""
     if isinstance(value, np.void):
         return Row(value.dtype)
     if isinstance(value, np.ndarray):
         dtype = Row(value.dtype) if value.dtype.names else from_dtype(value.dtype)
-        if whole:
-            return types.Array(dtype, value.ndim, "C")
         return Elements(dtype, sizes or (0,) * value.ndim)
     if not isinstance(value, tuple):
         return type_of_letters(letter_of(value))
     named: Any = type(value)
     if not hasattr(named, "_fields"):
-        return types.Tuple.from_types([type_of(each, whole) for each in value])
+        return types.Tuple.from_types([type_of(each) for each in value])
     declared = sizes_of(named)
     found = {
-        name: type_of(each, whole, declared.get(name, ()))
+        name: type_of(each, declared.get(name, ()))
         for name, each in zip(named._fields, value, strict=True)
     }
     if all(isinstance(each, types.Number) for each in found.values()):
@@ -177,13 +174,6 @@ def value_at(context, builder, kind, table, at):
         return context.make_tuple(builder, kind, values)
     if kind == types.none:
         return context.get_dummy_value()
-    if isinstance(kind, types.Array):
-        place, shape = types.CPointer(kind.dtype), types.UniTuple(types.intp, kind.ndim)
-        given = [
-            data_of(context, builder, kind, table, at),
-            value_at(context, builder, shape, table, at + 1),
-        ]
-        return context.compile_internal(builder, whole_array, kind(place, shape), given)
     word = read_word(builder, table, at)
     if isinstance(kind, Row):
         return builder.inttoptr(word, WORD.as_pointer())
@@ -196,17 +186,6 @@ def size(builder, kind, value, axis):
     """Return a size of an array."""
     known = kind.sizes[axis]
     return WORD(known) if known else read_word(builder, value, 1 + axis)
-
-
-def data_of(context, builder, kind, table, at=0):
-    """Return the address of the data of an array that begins at a position of a table."""
-    element = WORD if isinstance(kind.dtype, Row) else context.get_data_type(kind.dtype)
-    return builder.inttoptr(read_word(builder, table, at), element.as_pointer())
-
-
-def whole_array(place, shape):
-    """Return an array as numba has them."""
-    return carray(place, shape)
 
 
 def place_of_element(context, builder, kind, value, index, given):
@@ -224,7 +203,9 @@ def place_of_element(context, builder, kind, value, index, given):
         offset = number
     if isinstance(kind.dtype, Row):
         offset = builder.mul(offset, WORD(kind.dtype.size // 8), flags=["nsw"])
-    return builder.gep(data_of(context, builder, kind, value), [offset], inbounds=True)
+    element = WORD if isinstance(kind.dtype, Row) else context.get_data_type(kind.dtype)
+    data = builder.inttoptr(read_word(builder, value, 0), element.as_pointer())
+    return builder.gep(data, [offset], inbounds=True)
 
 
 def place_of_field(context, builder, kind, value, name):

@@ -49,11 +49,10 @@ _one_at_a_time = threading.RLock()
 
 
 @functools.cache
-def options_text(allocates: bool) -> str:
+def options_text() -> str:
     """Return how functions are compiled, for the hash: the code that says how."""
     files = sorted(Path(__file__).parent.glob("*.py"))
-    digest = hashlib.blake2b(b"".join(each.read_bytes() for each in files), digest_size=8)
-    return f"{allocates} {digest.hexdigest()}"
+    return hashlib.blake2b(b"".join(map(Path.read_bytes, files)), digest_size=8).hexdigest()
 
 
 def symbol_of(function: Callable, types: str) -> str:
@@ -67,13 +66,12 @@ class Engine:
     """A linked function with all units that it calls: found on the disk or compiled at its first
     call, and once more for arguments of other types.
 
-    Parameters: ``entry``, the function, in the file called ``name``; ``allocates``: it makes arrays
-    for itself; ``what`` it is, for who waits; ``complete``: with what is postponed.
+    Parameters: ``entry``, the function, in the file called ``name``; ``what`` it is, for who waits;
+    ``complete``: with what is postponed.
     """
 
     entry: Callable
     name: str
-    allocates: bool = False
     what: str = ""
     complete: bool = False
     functions: dict[tuple[Any, ...], Callable] = attrs.field(factory=dict, init=False)
@@ -85,7 +83,7 @@ class Engine:
     @functools.cached_property
     def whole(self) -> "Engine":
         """The same with what is postponed."""
-        return Engine(self.entry, self.name, self.allocates, self.what, True)
+        return Engine(self.entry, self.name, self.what, True)
 
     def __call__(self, *arguments: Any) -> Any:
         words, kinds = table_of(arguments)
@@ -94,7 +92,7 @@ class Engine:
             def given() -> list[Any]:
                 from flocsim.compiler.table_types import type_of
 
-                return type_of(arguments, self.allocates).types
+                return type_of(arguments).types
 
             address, returned = self.load(kinds_text(kinds), given, table=True)
             self.functions[kinds] = function_at(address, returned, layout_of(words))
@@ -121,7 +119,7 @@ class Engine:
             function = getattr(function, "stand_in", function)
         name = self.name
         if function is not self.entry:
-            name = f"flocsim_unit_{hashed(describe(function).lines, options_text(self.allocates))}"
+            name = f"flocsim_unit_{hashed(describe(function).lines, options_text())}"
         file = name, repr((symbol, compiled_for(hasattr(function, "loops"))))
         # Nobody else can have written what is read (disk_cache).
         data = disk_cache.read(*file)
@@ -160,7 +158,7 @@ class Engine:
                 return 1
             return 0
 
-        options = accelerator.options(True, self.allocates)
+        options = accelerator.options(True)
         try:
             made = numba.cfunc("i8(i8, i8)", error_model="numpy", **options)(run)
         except numba.errors.NumbaError as error:
@@ -184,7 +182,7 @@ class Engine:
         import numba
 
         small = len(clone.__code__.co_code) < INLINED_SIZE
-        options = accelerator.options(False, self.allocates)
+        options = accelerator.options(False)
         # Dividing by zero gives what it does in numpy.
         made = numba.njit(clone, error_model="numpy", forceinline=small, **options)
         if accelerator.is_on():
@@ -197,7 +195,7 @@ class Engine:
         compiled apart; None for others."""
         if isinstance(value, Intrinsic):
             return self.inner(value.make())
-        if not hasattr(value, "apart") or self.allocates or not accelerator.is_on():
+        if not hasattr(value, "apart") or not accelerator.is_on():
             return None
         from flocsim.compiler.table_types import call_of
 

@@ -145,17 +145,3 @@ def test_arguments_of_other_types_are_compiled_for_anew():
 def test_an_array_in_another_order_is_refused():
     with pytest.raises(KernelError, match=r"shape \(3, 2\)\) does not lie in C order"):
         compose(mixed, {})(True, 1, View(2.0, 0.0), (0.0, 0), np.zeros((2, 3)).T)
-
-
-def total(array):
-    found = np.zeros(1)
-    for row in array:
-        found[0] += row.sum() + row[0]
-    return found[0]
-
-
-def test_functions_that_allocate_have_arrays_as_numba_has_them():
-    array = np.arange(24.0).reshape(2, 3, 4)
-    compiled = compose(total, {}, allocates=True)
-    for each in (array[0], array[1]):
-        assert compiled(each) == total(each)
