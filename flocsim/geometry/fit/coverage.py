@@ -66,8 +66,8 @@ def first_pixel(least, size):
 
 
 def no_cover(shape: tuple[int, int], inside: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Counts per pixel (h, w) before any edge is counted: (bool, edges crossed to the right are
-    odd; int32, edges within the radius); ``inside``: outside is taken for inside."""
+    """Return counts per pixel (h, w) before any edge is counted: (bool, edges crossed to the right
+    are odd; int32, edges within the radius); ``inside``: outside is taken for inside."""
     return np.full(shape, inside), np.zeros(shape, np.int32)
 
 

@@ -80,7 +80,7 @@ class Ring(NamedTuple):
     them."""
 
     points: np.ndarray  # (places, choices, 2) [px]
-    costs: np.ndarray  # [k, a, i, j] from place k, point i to the place 1 + a further on, point j
+    costs: np.ndarray  # [k, a, i, j] of edges from place k, point i to place k + 1 + a, point j
     least: np.ndarray  # (N + 1, places + 1, choices): cost of the cheapest way so far
     came: np.ndarray  # (N + 1, places + 1, choices): the last edge of that, a · choices + i
     places: np.ndarray  # (N,) of the cheapest way round
@@ -88,8 +88,8 @@ class Ring(NamedTuple):
 
 
 def ring_of(points: np.ndarray, count: int, longest: int) -> Ring:
-    """A ring of points (places, choices, 2), on which a way takes ``count`` of the places, at most
-    the ``longest`` next one each time."""
+    """Return a Ring of points (places, choices, 2) for ways of ``count`` edges, each at most
+    ``longest`` places long."""
     size, choices, _ = points.shape
     costs = np.empty((size, longest, choices, choices), np.int64)
     least, came = np.empty((2, count + 1, size + 1, choices), np.int64)
@@ -98,8 +98,8 @@ def ring_of(points: np.ndarray, count: int, longest: int) -> Ring:
 
 
 def scratch(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What a search of N vertices overwrites: other vertices (N, 2), directions (N, 2), sums of
-    edges (N,)."""
+    """Return arrays for a search of N vertices to overwrite: other vertices (N, 2), directions
+    (N, 2), sums of edges (N,)."""
     return *np.empty((2, count, 2)), np.empty(count, np.int64)
 
 
@@ -175,7 +175,7 @@ def best_way(ring, start, spread):
 
 
 def move_all(sums, vertices, moved, out, edges, ring, radius, directions, steps):
-    """The kernel of descend; ``directions`` are those of a ring's choices."""
+    """Do what descend does; ``directions`` (choices, 2) are those of all choices of a vertex."""
     last = vertices.shape[0] - 1
     lowest = POSSIBLE
     for turn in range(steps.shape[0]):
@@ -209,6 +209,7 @@ def descend(
 
     vertices (N, 2): changed in place; steps [px].  The polygon stays simple and open.
     """
+    # The first choice of each vertex is where it is.
     count, choices = len(vertices), np.vstack([np.zeros(2), directions])
     ring = ring_of(np.empty((count, *choices.shape)), count, longest=1)
     compiled(move_all)(sums, vertices, *scratch(count), ring, radius, choices, steps)

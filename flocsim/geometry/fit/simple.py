@@ -170,7 +170,7 @@ def draw_in(vertices, depth, inwards):
 
 
 def untangle_and_draw_in(vertices, depth, inwards):
-    """The kernel of simple_inset; ``inwards`` (N, 2) is overwritten."""
+    """Do what simple_inset does; ``inwards`` (N, 2) is overwritten."""
     if not all_clear(vertices):
         untangle(vertices)
         if not all_clear(vertices):
