@@ -112,7 +112,7 @@ def repulsion_of_circles(
 
 def pushes(scene, work, total, gaps, found):
     """The force on the second of two spheres away from the first, at each gap, into ``found``."""
-    for k in range(len(gaps)):
+    for k in range(gaps.shape[0]):
         work.place[NOW, 1, X] = total + gaps[k]
         evaluate_as_they_lie(scene, work)
         found[k] = work.force[NOW, 1, X]

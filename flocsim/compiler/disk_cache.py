@@ -86,8 +86,11 @@ def write(name: str, key: str, data: bytes) -> None:
 
 
 def has(name: str) -> bool:
-    """Return True if something was written under a name."""
-    return any(cache_folder().glob(f"{name}-*{SUFFIX}"))
+    """Return True if something was written under a name, or nothing can be written."""
+    folder = cache_folder()
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+    return any(folder.glob(f"{name}-*{SUFFIX}")) or not os.access(folder, os.W_OK)
 
 
 def kept(name: str, key: str, make: Callable[[], bytes]) -> bytes:
