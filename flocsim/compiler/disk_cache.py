@@ -86,7 +86,10 @@ def write(name: str, key: str, data: bytes) -> None:
 
 
 def has(name: str) -> bool:
-    """Return True if something was written under a name, or nothing can be written."""
+    """Return True if something was written under a name, or nothing can be written.
+
+    Makes the folder if it is missing, as it is about to be written to.
+    """
     folder = cache_folder()
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)

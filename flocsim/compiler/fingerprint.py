@@ -165,13 +165,13 @@ def describe(entry: Any) -> Description:
 def refuse_python(function: Any) -> None:
     """Raise KernelError where a function prints or raises, which compiled code cannot do while it
     runs."""
-    # `assert` compiles to the instruction of `raise`.
-    operations = {one.opname for each in codes_in(function.__code__) for one in dis.Bytecode(each)}
-    if "RAISE_VARARGS" in operations or any(each is print for each in reads(function).values()):
+    # Every other byte is the number of an operation; `assert` compiles to that of `raise`.
+    operations = b"".join(code.co_code[::2] for code in codes_in(function.__code__))
+    prints = any(value is print for value in reads(function).values())
+    if prints or dis.opmap["RAISE_VARARGS"] in operations:
         raise KernelError(
             f"kernel {where(function)} prints, raises an exception or asserts, which compiled code "
-            "cannot: return math.nan where there is no answer, and call it from Python to look "
-            "into it"
+            "cannot: return math.nan where there is no answer; to look into it, use jit=False"
         )
 
 

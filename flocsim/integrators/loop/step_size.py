@@ -1,4 +1,4 @@
-"""The size of the next step: from the last error, the candidate lists, and imminent switches.
+"""The size of the next step: from the last error, the candidate lists, and contacts that close.
 
 The controller is Gustafsson's predictive one (Hairer & Wanner, Solving Ordinary Differential
 Equations II (1996), section IV.8), with p the power of h that the error estimate follows:
