@@ -240,11 +240,8 @@ def capacity(scene, work, time, bond, near, enough):
     if not is_enough(total, outline_part, centre_part, enough):
         # Refine around the maximum, which may be a cusp.
         around = CLIMB_STEP * variation_length(scene, bond, best, radii_of(scene, bond))
-        start, end, found = (
-            max(best - around, 0.0),
-            best + around,
-            (total, outline_part, centre_part),
-        )
+        start, end = max(best - around, 0.0), best + around
+        found = total, outline_part, centre_part
         total, outline_part, centre_part, _ = largest_attraction(
             *known, start, end, near, REFINEMENT * CLIMB_STEP, enough, found
         )

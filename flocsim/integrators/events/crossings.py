@@ -131,8 +131,8 @@ def share_of_dip(scene, work, step, row, level):
     """
     if not may_dip_below(work, step, row, level):
         return math.inf
-    rates = margin_rate(work, NOW, row), margin_rate(work, NEW, row)
-    return share_of_minimum(scene, work, step, row, 0.0, 1.0, rates[0], rates[1])
+    falling, rising = margin_rate(work, NOW, row), margin_rate(work, NEW, row)
+    return share_of_minimum(scene, work, step, row, 0.0, 1.0, falling, rising)
 
 
 def locate_crossing(scene, work, step, row, high, at_high, resolution):
