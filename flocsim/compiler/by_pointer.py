@@ -25,7 +25,6 @@ class Kept(NamedTuple):
     value: tuple[Any, ...]
     words: list[Any]  # its part of a table
     kinds: tuple[Any, ...]  # the types of these
-    arrays: list[Any]  # those that `clear` clears
 
 
 KEPT: dict[int, Kept] = {}
@@ -53,27 +52,13 @@ def address_of(value: Any) -> int:
     return int(plain.ctypes.data)
 
 
-def written(value: Any) -> list[Any]:
-    """Return each record in a value, and each array that may be written, as `as_plain` does."""
-    if isinstance(value, tuple):
-        return [array for each in value for array in written(each)]
-    arrays = [as_plain(value)] if isinstance(value, np.ndarray | np.void) else []
-    return [array for array in arrays if array.size and array.flags.writeable]
-
-
 def keep(value: tuple[Any, ...], owner: Any) -> None:
     """Remember what a tuple is in tables while its owner lives: they are then made in a fraction of
     the time. Its arrays may not be exchanged meanwhile."""
     if id(value) not in KEPT:
         # The entry holds the tuple itself, so that no other object is given its id meanwhile.
-        KEPT[id(value)] = Kept(value, *table_of(value), written(value))
+        KEPT[id(value)] = Kept(value, *table_of(value))
         weakref.finalize(owner, KEPT.pop, id(value), None)
-
-
-def clear(value: tuple[Any, ...]) -> None:
-    """Set all records of a kept tuple, and all arrays that may be written, to zero."""
-    for array in KEPT[id(value)].arrays:
-        array.fill(0)
 
 
 def letter_of(value: Any) -> str:

@@ -26,29 +26,66 @@ def fields_of(kind: Any) -> dict[str, tuple[Any, tuple[int | str, ...]]]:
 
 
 def zeros_of(kind: Any, **sizes: int) -> Any:
-    """Return a NamedTuple of arrays of zeros, of the given sizes {name: number}."""
-    made: dict[str, Any] = {}
+    """Return a NamedTuple of arrays of zeros, of the given sizes {name: number}, which lie in one
+    block of memory."""
+    return views_in(np.zeros(1, block_type(kind, sizes)), kind)
+
+
+def block_type(kind: Any, sizes: dict[str, int]) -> np.dtype[Any]:
+    """Return the type of a record that has all arrays of a declaration as its fields."""
+    fields: list[Any] = []
     for name, (element, shape) in fields_of(kind).items():
         whole = tuple(sizes[each] if isinstance(each, str) else each for each in shape)
-        if not issubclass(element, Record):
-            made[name] = np.zeros(whole, element) if shape else zeros_of(element, **sizes)
+        if hasattr(element, "_fields"):
+            element = block_type(element, sizes)
+        elif issubclass(element, Record):
+            element = element.dtype
+        fields.append((name, element, whole))
+    return np.dtype(fields, align=True)
+
+
+def views_in(block: np.ndarray, kind: Any) -> Any:
+    """Return the declared tuple of a block (1,): views of its fields."""
+    made = []
+    for name, (element, _) in fields_of(kind).items():
+        field = block[name]
+        made.append(views_in(field, element) if hasattr(element, "_fields") else field[0])
+    return kind(*made)
+
+
+def clear(arrays: Any) -> None:
+    """Set all arrays of a tuple, of which the first is as zeros_of made it, to zero; not those that
+    have been put in the place of others."""
+    # A view's base is the block.
+    arrays[0].base.view(np.uint8).fill(0)
+
+
+def sizes_in(arrays: Any) -> dict[str, int]:
+    """Return the sizes {name: number} that a tuple was made with."""
+    found: dict[str, int] = {}
+    for value, (element, shape) in zip(arrays, fields_of(type(arrays)).values(), strict=True):
+        if hasattr(element, "_fields"):
+            found |= sizes_in(value)
+        elif shape:
+            named = zip(shape, value.shape, strict=True)
+            found |= {name: size for name, size in named if isinstance(name, str)}
+    return found
+
+
+def copy_into(arrays: Any, larger: Any) -> None:
+    """Copy the contents of a tuple of arrays to where another one of the same kind begins."""
+    for value, room in zip(arrays, larger, strict=True):
+        if isinstance(value, tuple):
+            copy_into(value, room)
+        elif isinstance(value, Record):
+            room.base[0] = value
         else:
-            made[name] = element.rows(*whole) if shape else element.one()
-    return kind(**made)
+            room[tuple(map(slice, value.shape))] = value
 
 
 def enlarged(arrays: Any, **sizes: int) -> Any:
-    """Return the same tuple in which the axes of such names have the given sizes, with zeros at
+    """Return a copy of a tuple in which the axes of such names have the given sizes, with zeros at
     their ends."""
-    larger: dict[str, Any] = {}
-    for name, (element, shape) in fields_of(arrays.__class__).items():
-        value = getattr(arrays, name)
-        if hasattr(element, "_fields"):
-            larger[name] = enlarged(value, **sizes)
-        elif sizes.keys() & set(shape):
-            whole = [
-                sizes.get(str(each), size) for each, size in zip(shape, value.shape, strict=True)
-            ]
-            larger[name] = np.zeros(whole, value.dtype)
-            larger[name][tuple(map(slice, value.shape))] = value
-    return arrays._replace(**larger)
+    larger = zeros_of(type(arrays), **(sizes_in(arrays) | sizes))
+    copy_into(arrays, larger)
+    return larger

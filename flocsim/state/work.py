@@ -9,7 +9,6 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from flocsim.compiler.by_pointer import clear
 from flocsim.state.bodies import MOST_FRAMES, BodyErrors, Cluster, Disc, Frame, Kick, KickTime, Pose
 from flocsim.state.clock import BLOCKS_FULL, NOTHING_FULL, PAIRS_FULL, Tally
 from flocsim.state.contacts import (
@@ -20,7 +19,7 @@ from flocsim.state.contacts import (
     SavedContact,
     VertexAtEdge,
 )
-from flocsim.state.declared import enlarged, zeros_of
+from flocsim.state.declared import clear, enlarged, zeros_of
 from flocsim.state.outlines import (
     MOST_FEET,
     MOST_ORDER,
@@ -245,8 +244,7 @@ def fits(work: Work, scene: Scene) -> bool:
 
 
 def begin_anew(work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray) -> None:
-    """Reset kept work arrays (by_pointer.keep) to those of work_of for a scene of as many bodies,
-    faster than new ones."""
+    """Reset work arrays to those of work_of for a scene of as many bodies, faster than new ones."""
     clear(work)
     begin(work, scene, position, velocity)
 
@@ -277,5 +275,6 @@ def with_room(work: Work) -> Work:
         sizes = sizes_of_pairs(n, 2 * pairs, room)
     elif full == BLOCKS_FULL:
         sizes = {"room": 2 * room} | sizes_of_pairs(n, pairs, 2 * room)
-    larger: Work = enlarged(work, **sizes)
+    # Nothing is ever written to the rules, so that all can have the same.
+    larger: Work = enlarged(work, **sizes)._replace(rules=work.rules)
     return larger

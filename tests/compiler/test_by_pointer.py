@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pytest
 
-from flocsim.compiler.by_pointer import KEPT, clear, keep, table_of
+from flocsim.compiler.by_pointer import KEPT, keep, table_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import KernelError
 
@@ -103,16 +103,6 @@ def test_what_stays_is_told_alike_until_its_owner_is_gone():
     assert id(state) in KEPT
     del owner
     assert id(state) not in KEPT
-
-
-def test_what_stays_is_cleared_but_for_what_must_not_be_written():
-    state, owner = outer(), Owner()
-    state.counts.flags.writeable = False
-    counts = state.counts.copy()
-    keep(state, owner)
-    clear(state)
-    np.testing.assert_array_equal(state.counts, counts)
-    assert not any(each.any() for each in (state.places, state.waves, state.inner.numbers))
 
 
 @pytest.mark.parametrize("function", [reads, writes, sizes])
