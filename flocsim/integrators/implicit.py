@@ -32,7 +32,7 @@ from flocsim.integrators.radau.grazing import (
     clear_grazing_resistances,
     set_grazing_resistances,
 )
-from flocsim.integrators.radau.stages import evaluate_states, solve_stages
+from flocsim.integrators.radau.stages import TARGET_RATE, evaluate_states, solve_stages
 from flocsim.integrators.radau.systems import factorise_systems
 from flocsim.integrators.rhs.error import end_of_run, error_ratio
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
@@ -42,11 +42,6 @@ from flocsim.state.work import NOW
 
 ESTIMATE_ORDER = 4.0
 """The error estimates of both kinds of step scale as this power of the step size."""
-
-TARGET_RATE = 0.4
-"""Convergence rate of Newton's method that the next step aims at. The rate scales about as h²:
-faster convergence would waste iterations on short steps, slower convergence would risk a failed
-step."""
 
 
 def is_retry(scene, clock):

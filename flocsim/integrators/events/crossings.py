@@ -19,7 +19,7 @@ from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import locate_polygons, update_rotation
 from flocsim.integrators.events.interpolation import interpolate
 from flocsim.integrators.events.resolution import release_resolution, touch_resolution
-from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
+from flocsim.integrators.rhs.contact_stiffness import RESOLVED_PHASE, secant_stiffness
 from flocsim.integrators.rhs.surface_gap import least_row, pair_end
 from flocsim.integrators.rhs.views import contact_view, normal_rate, velocity_lifetime_of
 from flocsim.state.bodies import ANGLE, X, Y
@@ -287,9 +287,6 @@ def first_switch(scene, work, step, resolution, depth):
 OVERTAKE_FRACTION = 0.25
 """A contact has overtaken another if their order changes by this fraction of both their
 overlaps."""
-
-RESOLVED_PHASE = 1.0
-"""A step of this multiple of 1/ω0 follows a contact's vibration."""
 
 
 def overtakes(work, old, new):

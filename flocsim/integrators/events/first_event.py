@@ -14,23 +14,17 @@ from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.hooks import SLIP_LIMIT, awaits_touch, contact_event, has
 from flocsim.integrators.events.crossings import first_switch
 from flocsim.integrators.events.grazes import START_FRACTION, grazing_end_share
-from flocsim.integrators.events.resolution import OVERLAP_FRACTION
+from flocsim.integrators.events.resolution import OVERLAP_FRACTION, RESOLUTION
 from flocsim.integrators.rhs.error import at_least_rounding, step_tolerance
 from flocsim.integrators.rhs.friction import set_sliding, slip_transition
 from flocsim.integrators.rhs.views import contact_view, view_without_slip
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import NEW, NOW
 
-RESOLUTION = 1e-3
-"""A switch is located to this fraction of the tolerance, and to OVERLAP_FRACTION of the deepest
-overlap, but not finer than the rounding of coordinates."""
-
 KINK_FINENESS = 1e-4
-"""A kink is located to this fraction of its distance at the start of the step."""
-
-KINK_ROUNDING = 1e-6
-"""An event function within this fraction of its value for the same overlap at rest counts as zero:
-its sign may be rounding, and steps would end there for ever."""
+"""A kink is located to this fraction of its distance at the start of the step. An event function
+within this fraction of its value for the same overlap at rest counts as zero: its sign may be
+rounding, and steps would end there for ever."""
 
 
 def switch_resolutions(work, clock):
@@ -63,7 +57,7 @@ def kink_share(scene, work, row, which):
     # Too near to either end to be told from rounding.
     nearer, further = min(abs(before), abs(after)), max(abs(before), abs(after))
     at_rest = contact_event(scene, view_without_slip(view, view.overlap, 0.0), which)
-    negligible = max(KINK_FINENESS * further, KINK_ROUNDING * abs(at_rest))
+    negligible = KINK_FINENESS * max(further, abs(at_rest))
     if before * after >= 0.0 or nearer <= negligible:
         return math.inf
     # Aim past the kink, so that the next step begins behind it.

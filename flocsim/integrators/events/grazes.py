@@ -12,9 +12,11 @@ tolerance resolves all this.
 import math
 
 from flocsim.compiler.linker import apart
+from flocsim.constants import TINY
 from flocsim.geometry.contact.candidates import SAME_POINT
 from flocsim.geometry.contact.points import contact_point, length_of
 from flocsim.hooks import contact_derivatives, contact_force
+from flocsim.integrators.events.resolution import RESOLUTION
 from flocsim.integrators.rhs.error import NEGLIGIBLE, at_least_rounding
 from flocsim.integrators.rhs.friction import (
     GRAZING_STIFFNESS_RATIO,
@@ -31,10 +33,9 @@ from flocsim.integrators.rhs.views import (
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import NEW, NOW
 
-FIRST_FLIGHT_HEIGHT, FIRST_RELEASE = 1e-3, 30.0
-"""A pair that does not chatter yet grazes if its speed would lift it by less than this fraction of
-the tolerance, a chattering one by less than NEGLIGIBLE of it; and the largest displacement, in
-tolerances, by the speed that its tangential spring releases."""
+FIRST_RELEASE = 30.0
+"""Largest displacement, in tolerances, by the speed that its tangential spring releases, with which
+a pair grazes that does not chatter yet."""
 
 CHATTER_COUNT = 5
 """A pair chatters after this many flights in a row of no more than NEGLIGIBLE."""
@@ -43,9 +44,6 @@ START_FRACTION = 0.02
 """Grazing that ends within this fraction of a step ends at its start; a step that may not pass the
 end of grazing ends this much after it."""
 
-TOUCHING_GAP = -1e-30
-"""Gap of a pair that touches without overlap [m]: only its sign matters."""
-
 
 def begins_grazing(scene, work, clock, row):
     """Return True if a pair that has just parted grazes from now on."""
@@ -53,11 +51,12 @@ def begins_grazing(scene, work, clock, row):
     if work.candidates[row].slide_direction != 0 or chatters_in_turn(work, row):
         return False
     # Height of the flight: v²/(2 a), with the acceleration a that its own tangential force causes.
+    # A pair that does not chatter yet must stay below what switches are located to.
     view = contact_view(scene, work, NOW, row)
     _, force = contact_force(scene, view)
     _, by_tangential = gap_responses(scene, work, row)
     speed, pull = normal_rate(work, NOW, row), abs(force * by_tangential)
-    share = NEGLIGIBLE if chatters(work, row) else FIRST_FLIGHT_HEIGHT
+    share = NEGLIGIBLE if chatters(work, row) else RESOLUTION
     if speed * speed > 2.0 * pull * share * clock.tolerance:
         return False
     # A normal force that acts without overlap, such as cohesion, holds or opens the pair by itself.
@@ -170,7 +169,8 @@ def continues_grazing(scene, work, row):
         return False
     # It no longer slides: the spring takes over.
     if resticks(scene, work, row):
-        end_grazing(work, row, CLOSED, TOUCHING_GAP)
+        # It touches without overlap: only the sign of its gap matters.
+        end_grazing(work, row, CLOSED, -TINY)
         return False
     return True
 
@@ -319,6 +319,6 @@ def end_grazing_early(scene, work, clock, step):
             if fresh or contact.grazing_force * final_force(work, row) < 0.0:
                 end_grazing(work, row, OPEN, 0.0)
             else:
-                end_grazing(work, row, CLOSED, TOUCHING_GAP)
+                end_grazing(work, row, CLOSED, -TINY)
             changed = True
     return changed

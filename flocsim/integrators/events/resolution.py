@@ -11,6 +11,10 @@ from flocsim.integrators.rhs.contact_stiffness import normal_force_at, secant_st
 from flocsim.integrators.rhs.error import at_least_rounding
 from flocsim.integrators.rhs.views import contact_view, normal_rate, velocity_lifetime_of
 
+RESOLUTION = 1e-3
+"""A switch is located to this fraction of the tolerance, and to OVERLAP_FRACTION of the deepest
+overlap, but not finer than the rounding of coordinates."""
+
 OVERLAP_FRACTION = 0.02
 """Where bodies rebound, their touch is located to this fraction of the depth of the impact,
 speed/ω0; while contacts are pressed, switches to this fraction of the deepest overlap."""
@@ -24,7 +28,8 @@ MOST_LATER = 1e3
 to at most this multiple of the resolution: to some tolerance."""
 
 NEARLY = 0.99
-"""Margin that tells critical damping from less in spite of rounding."""
+"""Margin that tells critical damping from less in spite of rounding. Critically damped doublets would
+rattle for ten times the steps if they counted as bouncing."""
 
 
 def bounces(scene, view, speed, frequency):

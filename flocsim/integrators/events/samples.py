@@ -5,6 +5,8 @@ step with an event is cut at the first sample that shows it. The event is then l
 ends of the shorter step, like any other (events/crossings.py).
 """
 
+import math
+
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import locate_polygons, update_rotation
 from flocsim.hooks import SLIP_LIMIT, contact_event, has
@@ -18,27 +20,26 @@ from flocsim.integrators.events.crossings import (
 )
 from flocsim.integrators.events.interpolation import end_within, interpolate
 from flocsim.integrators.exponential.collocation import NODES
+from flocsim.integrators.rhs.contact_stiffness import RESOLVED_PHASE
 from flocsim.integrators.rhs.friction import excess_slip_rate, slip_limit_at, slip_of_motion
 from flocsim.integrators.rhs.views import contact_view
 from flocsim.state.contacts import CLOSED, OPEN
 from flocsim.state.work import FIRST_STAGE, NEW, NOW, TRIAL
 
-PART_PHASE = 1.6
-"""Phase [rad] of the fastest vibration in a part of the step: about a quarter of a period."""
+HALF_PERIOD = math.pi
+"""Phase [rad] of the fastest vibration up to which the gaps at both ends of a step show whether a
+contact has opened or closed. A part of a longer step is a quarter of a period at most."""
 
 PART_DISPLACEMENT = 0.1
 """Largest displacement of two bodies in a part, over the radius of the smaller one."""
-
-UNSAMPLED_PHASE = 3.0
-"""Phase [rad] of the fastest vibration, half a period, up to which the gaps at both ends show
-whether a contact has opened or closed."""
 
 
 def parts_by_phase(scene, phase):
     """Return the number of parts that the phase of the fastest vibration requires."""
     # Sliding, and kinks of a law, may come and go within half a period.
-    threshold_phase = 1.0 if has(scene, SLIP_LIMIT) or scene.events > 0 else UNSAMPLED_PHASE
-    return 1 if phase <= threshold_phase else int(phase / PART_PHASE) + 1
+    kinks = has(scene, SLIP_LIMIT) or scene.events > 0
+    threshold_phase = RESOLVED_PHASE if kinks else HALF_PERIOD
+    return 1 if phase <= threshold_phase else int(2.0 * phase / HALF_PERIOD) + 1
 
 
 def place_bodies(work, step, share):

@@ -33,8 +33,10 @@ from flocsim.integrators.radau.stages import (
     locate_state,
     update_stage_slips,
 )
+from flocsim.integrators.rhs.contact_stiffness import RESOLVED_PHASE
 from flocsim.integrators.rhs.error import (
     ITERATION_TOLERANCE,
+    MAX_ITERATIONS,
     rounding_error,
     step_tolerance,
 )
@@ -68,13 +70,6 @@ MATRIX = (
 )
 """Lobatto IIIA: weights of the rates at the three points in the increments up to them. The rate at
 0 is left out: the quantities that are integrated by these weights are zero there."""
-
-MAX_ITERATIONS = 6
-"""Iterations before the step is left to Radau IIA."""
-
-NO_SWING_PHASE = 1.0
-"""Phase h ω [rad] of the fastest vibration below which nothing oscillates in a step: its path has
-one direction."""
 
 MIN_ALIGNMENT = 0.1
 """Least |R · Δx| over the sum of the absolute products. Below it the step does not move along R."""
@@ -229,6 +224,7 @@ def solve_series(scene, work, clock, step, known):
     if terms > 0:
         # From here on the stages of Radau are overwritten.
         clock.stages_step = 0.0
+    # If these do not converge, the step is left to Radau IIA.
     for _ in range(MAX_ITERATIONS):
         if terms == 0:
             return 0
@@ -292,7 +288,7 @@ def estimate_series_error(work, clock, step):
 
 def nothing_swings(clock):
     """Return True if the step is so short that nothing oscillates in it."""
-    return clock.series_norm <= NO_SWING_PHASE
+    return clock.series_norm <= RESOLVED_PHASE
 
 
 def error_ratios_along_path(work, fraction):

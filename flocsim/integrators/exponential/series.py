@@ -11,6 +11,7 @@ small change of the motion, or of R.
 
 import math
 
+from flocsim.constants import TINY
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.views import inertia, lever
 from flocsim.state.work import DAMPING, LEVER, MOTION, MOVED, NOW, STIFFNESS, TERMS
@@ -20,9 +21,6 @@ TERM_TOLERANCE = 1e-3
 
 MIN_TERMS = 6
 """Fewest terms of a series: those that contain R."""
-
-TINY = 1e-200
-"""Keeps a quotient finite."""
 
 MAX_STIFFNESS = 150.0
 """h² K/M + h D/M of a coordinate above which the series does not end within TERMS terms. It is
@@ -124,7 +122,7 @@ def longest_step_ratio(last, late, early, goal):
     while k < TERMS - 2:
         term *= squared / ((k + 1.0) * (k + 2.0))
         k += 2
-    return (goal / max(term, TINY * goal)) ** (1.0 / k)
+    return (goal / max(term, TINY)) ** (1.0 / k)
 
 
 def phase_bound(work):

@@ -36,7 +36,6 @@ from flocsim.integrators.rhs.error import outline_size
 from flocsim.integrators.rhs.friction import grazing_force
 from flocsim.integrators.rhs.propagated_error import (
     GRAZING_AMPLIFICATION,
-    GRAZING_IN_VECTOR,
     SWITCH_AMPLIFICATION,
     VECTOR_SAFETY,
     bound_propagated,
@@ -48,9 +47,9 @@ from flocsim.state.clock import PLAIN, RADAU
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import CHANGE, FORCING, NOW, PROPAGATED, STEP_ERROR
 
-LEAST_VECTOR, SWITCH_FLOOR = 0.006, 0.15 / VECTOR_SAFETY
-"""Lower bounds of the vector's size, since its parts may cancel by chance: LEAST_VECTOR tolerances,
-and SWITCH_FLOOR of the sum of switching errors (a dozen grazes push it to and fro)."""
+LEAST_VECTOR = 0.01
+"""Lower bound of the vector's size, since its parts may cancel by chance, as a fraction of the
+tolerance, and of the sum of switching errors (a dozen grazes push it to and fro)."""
 
 UNCERTAIN_OVERLAP = 2.0
 """A contact may be open if its overlap is below this multiple of its gap's error."""
@@ -169,10 +168,7 @@ def propagate_errors(scene, work, clock, step):
         errors = work.errors[body]
         stated = largest
         if vector < math.inf:
-            least = max(
-                LEAST_VECTOR * clock.tolerance,
-                SWITCH_FLOOR * errors.switch_displacement,
-            )
+            least = LEAST_VECTOR * max(clock.tolerance, errors.switch_displacement)
             own = max(outline_size(scene, work.place, PROPAGATED, body), least)
             stated = min(stated, VECTOR_SAFETY * own)
         errors.stated = stated
@@ -279,7 +275,7 @@ def reset_slip_offsets(work):
         candidate = work.candidates[row]
         if candidate.slide_direction != 0 or candidate.contact_mode != CLOSED:
             grazes = candidate.contact_mode == GRAZING
-            lost = GRAZING_IN_VECTOR * work.slip[NOW, row] if grazes else 0.0
+            lost = GRAZING_AMPLIFICATION / VECTOR_SAFETY * work.slip[NOW, row] if grazes else 0.0
             work.contacts[row].slip_offset = lost - tangential_component(
                 work, row, work.place, PROPAGATED, NOW
             )

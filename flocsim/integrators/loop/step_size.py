@@ -14,9 +14,11 @@ import math
 from flocsim.constants import TINY
 from flocsim.geometry.contact.candidates import spendable_share, time_to_spend
 from flocsim.hooks import next_step
+from flocsim.integrators.events.samples import HALF_PERIOD
 from flocsim.integrators.exponential.collocation import may_be_series
 from flocsim.integrators.loop.kicks import kick_end
 from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
+from flocsim.integrators.rhs.error import ROUNDING
 from flocsim.integrators.rhs.views import contact_view, inertia, normal_rate, velocity_lifetime_of
 from flocsim.state.clock import PLAIN, RADAU
 from flocsim.state.contacts import CLOSED
@@ -55,10 +57,6 @@ SMALLEST_STEP = 1e-14
 """A step below this fraction of the elapsed time, or of 1 ms, moves nothing: rounding of the time
 is 2e-16. A run of such steps has stalled."""
 
-LEAST_ADVANCE = 2.3e-16
-"""A step of this fraction of the time is the shortest that changes the time in double precision;
-switches closer together than that count as simultaneous."""
-
 FRACTION_OF_FAILED, RECOVERY = 0.6, 2.0
 """After a failed step, the next ones are at most this fraction of it; the bound then grows by
 RECOVERY per step."""
@@ -68,13 +66,9 @@ TOUCH_ERROR_FRACTION = 0.1
 that the impact leads to; that of a series as (h ω0)⁵ over this times the overlap v/ω0 of the
 impact, for the rotation of the contact normal, which the series does not contain."""
 
-MAX_PHASE = 4.0
-"""Phase ω h [rad], ω being the fastest vibration, up to which the switches inside a series are
-found reliably. A Radau step with a switch in it is repeated as a series of this length."""
-
-LANDING_MARGIN, LANDING_FRACTION = 0.05, 0.5
-"""A step across switches ends LANDING_MARGIN tolerances before a pair lands in it; the step that
-contains the landing lasts LANDING_FRACTION of the time in which the pair moves by one tolerance."""
+LANDING_MARGIN = 0.05
+"""A step across switches ends this many tolerances before a pair lands in it; the step that
+contains the landing lasts as long as the pair takes to move by one tolerance."""
 
 
 def step_to_landing(work, clock, step):
@@ -92,7 +86,7 @@ def step_to_landing(work, clock, step):
         if gap > 0.0 and speed * step > max(gap, tolerance):
             approach = gap - LANDING_MARGIN * tolerance
             lands = approach <= 0.5 * LANDING_MARGIN * tolerance
-            step = (LANDING_FRACTION * tolerance if lands else approach) / speed
+            step = (tolerance if lands else approach) / speed
     return step
 
 
@@ -113,10 +107,11 @@ def choose_step(scene, work, clock, needs_lists):
 
 
 def representable_step(clock, step):
-    """Return the step, or the shortest one that changes the time in double precision."""
+    """Return the step, or one that changes the time in double precision: switches closer together
+    than that count as simultaneous."""
     if clock.tolerance == math.inf:
         return step
-    return max(step, min(LEAST_ADVANCE * clock.time, clock.until - clock.time))
+    return max(step, min(ROUNDING * clock.time, clock.until - clock.time))
 
 
 def moves(clock, step):
@@ -185,12 +180,12 @@ def step_to_switch(scene, work, step, share):
     """Return the step [s] to try after one that passed a switch at a fraction of it.
 
     A Radau step damps vibrations, and the switch may be an artefact of that. Then a series is tried
-    instead, as long as MAX_PHASE allows, but at most half of the step.
+    instead, of half a period of the fastest vibration, but at most half of the step.
     """
     fastest = fastest_vibration(scene, work)
     if work.tally.kind != RADAU or not may_be_series(scene, work) or fastest == 0.0:
         return share * step
-    return max(share * step, min(0.5 * step, MAX_PHASE / fastest))
+    return max(share * step, min(0.5 * step, HALF_PERIOD / fastest))
 
 
 def plan(scene, work, clock, step, ratio, aimed_at_switch, switched):

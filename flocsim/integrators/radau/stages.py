@@ -20,6 +20,7 @@ from flocsim.integrators.radau.systems import solve_both, write_residuals, write
 from flocsim.integrators.radau.tableau import MATRIX, NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.error import (
     ITERATION_TOLERANCE,
+    MAX_ITERATIONS,
     NEGLIGIBLE,
     at_least_rounding,
     rounding_error,
@@ -38,12 +39,11 @@ from flocsim.integrators.rhs.views import lever, velocity_lifetime_of
 from flocsim.state.contacts import CLOSED, GRAZING
 from flocsim.state.work import CHANGE, FIRST_STAGE, NOW
 
-MAX_ITERATIONS = 10
-"""Newton iterations before the step is rejected and repeated with a smaller size."""
-
-ASSUMED_RATE = 0.5
-"""Convergence rate assumed for the first iteration where no earlier step has shown one; upper bound
-of the extrapolated rate."""
+TARGET_RATE = 0.4
+"""Convergence rate of Newton's method that the next step aims at. The rate scales about as h²:
+faster convergence would waste iterations on short steps, slower convergence would risk a failed
+step. It is also assumed for the first iteration where no earlier step has shown a rate, and bounds
+the extrapolated one from above."""
 
 NEWTON_TOLERANCE = 1e-3
 """Error that Newton's method may leave, as a fraction of the step's tolerance; ITERATION_TOLERANCE
@@ -60,10 +60,6 @@ below the tolerance of positions they are (without this, rounding in them was ta
 the step, and cost 20 times the steps); with a surface force, relative to the smoothing length over
 which it passes from one feature pair to the next (rhs/surface_gap.py): larger errors shake bodies
 that lie flat in an energy well."""
-
-GRAZING_TOLERANCE = 0.02
-"""Relative tolerance of the tangential forces of grazing contacts; errors whose displacement is
-NEGLIGIBLE are ignored."""
 
 SMALLEST_RATE = 1e-3
 """Lower bound of the extrapolated convergence rate. Where it decides, an unneeded second iteration
@@ -159,7 +155,7 @@ def change_of_contacts(scene, work, step, stage, goal):
             force = abs(grazing_force(work, state, row))
             # A force that moves nothing by more than a share of the goal does not count.
             lever = GRAZING_STIFFNESS_RATIO / max(abs(resistance), TINY) * (step + memory)
-            allowed = max(GRAZING_TOLERANCE * force, NEGLIGIBLE * goal / max(lever, TINY))
+            allowed = max(ITERATION_TOLERANCE * force, NEGLIGIBLE * goal / max(lever, TINY))
             largest = max(largest, goal * change / allowed)
         elif candidate.surface_active == 1 and geometry.force_share > 0.0:
             # Surface force: fraction of its smoothing length.
@@ -215,11 +211,11 @@ def finish_stages(scene, work, step):
 def expected_rate(clock, step):
     """Return the convergence rate to be expected before a second iteration shows it (rate ∝ h²)."""
     if clock.second_iteration_rate == 0.0:
-        return ASSUMED_RATE
+        return TARGET_RATE
     growth = max(step / clock.second_iteration_step, 1.0)
     return min(
         max(RATE_SAFETY * clock.second_iteration_rate * growth * growth, SMALLEST_RATE),
-        ASSUMED_RATE,
+        TARGET_RATE,
     )
 
 

@@ -7,6 +7,9 @@ from flocsim.integrators.rhs.views import contact_view, view_without_slip
 from flocsim.state.clock import SERIES
 from flocsim.state.work import NOW
 
+RESOLVED_PHASE = 1.0
+"""Phase ω h [rad] up to which a step follows a vibration: its path has one direction."""
+
 UNRESOLVED_PHASE = 50.0
 """ω0 h from which a step leaves a contact's vibration out; shorter steps do so partly."""
 

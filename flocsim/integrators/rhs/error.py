@@ -19,11 +19,10 @@ from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.work import DAMPING, NEW, NOW, STEP_ERROR
 
 ROUNDING = 1e-15
-"""Relative rounding of a coordinate: a few units in the last place."""
+"""Relative rounding of a coordinate or a time: a few units in the last place."""
 
-COARSEST_ROUNDING = 2e-15
-"""Limit of any resolution, as a fraction of the coordinates: ten neighbouring floating-point
-numbers."""
+MAX_ITERATIONS = 10
+"""Iterations for the end of a step before it is repeated with a smaller size, or otherwise."""
 
 ITERATION_TOLERANCE = 0.01
 """Error that iterations for the end of a step may leave, as a fraction of the tolerance. With .05
@@ -152,4 +151,4 @@ def largest_coordinate(work, state):
 
 def at_least_rounding(work, state, length):
     """Return a length [m], but not less than what coordinates can resolve."""
-    return max(length, COARSEST_ROUNDING * largest_coordinate(work, state))
+    return max(length, ROUNDING * largest_coordinate(work, state))

@@ -19,11 +19,8 @@ VECTOR_SAFETY = 13.0
 
 GRAZING_AMPLIFICATION = 2.5
 """Factor by which motion may have amplified the error due to grazing: the propagated error does not
-know that contacts end sooner or later because of it."""
-
-GRAZING_IN_VECTOR = GRAZING_AMPLIFICATION / VECTOR_SAFETY
-"""Fraction of that error that enters the propagated vector. It is a bound already, so VECTOR_SAFETY
-must not multiply it."""
+know that contacts end sooner or later because of it. It is a bound already, so that VECTOR_SAFETY
+must not multiply it: it enters the vector divided by that."""
 
 
 def certain_bound(work, body):
@@ -110,5 +107,7 @@ def grazing_error_source(scene, work, row, tangential):
     opening += memory * normal_component(work, row, work.velocity, PROPAGATED, NOW)
     slipping = tangential_component(work, row, work.place, PROPAGATED, NOW)
     slipping += memory * tangential_component(work, row, work.velocity, PROPAGATED, NOW)
-    share = math.copysign(GRAZING_IN_VECTOR, normal * opening + tangential * slipping)
+    share = math.copysign(
+        GRAZING_AMPLIFICATION / VECTOR_SAFETY, normal * opening + tangential * slipping
+    )
     return share * normal, share * tangential
