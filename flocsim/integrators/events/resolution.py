@@ -28,8 +28,8 @@ MOST_LATER = 1e3
 to at most this multiple of the resolution: to some tolerance."""
 
 NEARLY = 0.99
-"""Margin that tells critical damping from less in spite of rounding. If they counted as bouncing, critically
-damped doublets would rattle for ten times the steps."""
+"""Margin that tells critical damping from less in spite of rounding. If they counted as bouncing,
+critically damped doublets would rattle for ten times the steps."""
 
 
 def bounces(scene, view, speed, frequency):
