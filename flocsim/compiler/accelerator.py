@@ -31,6 +31,9 @@ NEEDLESS_PASSES = (
 # The pass that stores all that numba inferred of a function, to be looked at.
 ANNOTATIONS = "AnnotateTypes"
 
+# What numba writes in colours, in messages for each attempt at a type.
+COLOURED = "code", "errmsg", "filename", "indicate", "highlight", "reset"
+
 # Functions that take more than a second and leave some ten MB behind.
 MANY = 50
 
@@ -174,12 +177,13 @@ def remembering(real: Callable, case_of: Callable) -> Callable:
 def replacements() -> Iterator[None]:
     """Exchange functions of numba inside; garbage waits, as millions of objects live until the end,
     through which the collector would walk again and again."""
-    from numba.core import event
+    from numba.core import errors, event
     from numba.core.base import BaseContext
     from numba.core.types import Function
 
     # The types of every `+` and `sqrt`; sizes of LLVM's types, each asked for by parsing a text;
-    # listeners of two events for every call of LLVM.
+    # listeners of two events for every call of LLVM; colours of messages that nobody sees.
+    errors.termcolor()  # made at the first call
     typed = remembering(
         Function.get_call_type, lambda f, context, given, more: (id(f), given, *more.items())
     )
@@ -189,6 +193,7 @@ def replacements() -> Iterator[None]:
         (BaseContext, "get_abi_sizeof", sized),
         (event, "start_event", lambda *_, **__: None),
         (event, "end_event", lambda *_, **__: None),
+        (errors, "_termcolor_inst", SimpleNamespace(**dict.fromkeys(COLOURED, str))),
     )
     collecting, before = gc.isenabled(), [vars(owner).get(name) for owner, name, _ in others]
     gc.disable()

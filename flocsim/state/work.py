@@ -190,7 +190,7 @@ def work_of(
     scene: Scene,
     position: np.ndarray,
     velocity: np.ndarray,
-    capacity: int = 256,
+    capacity: int = 64,
     pairs: int | None = None,
     blocks: int | None = None,
     all_pairs: bool = True,

@@ -7,7 +7,7 @@ from scipy.spatial import ConvexHull
 from flocsim.ensembles.collision.draw import point, points_of
 from flocsim.ensembles.collision.mechanisms import settling_interval
 from flocsim.ensembles.collision.start import (
-    half_extents,
+    half_extent,
     half_widths,
     largest_displacement,
     place_pair,
@@ -124,7 +124,7 @@ def test_parts_of_unlike_spheroradii_reach_as_far_as_their_outline():
         outline = np.concatenate(HEADED.outline(angle=turn, points_per_quadrant=500))[:, 0]
         assert left[place] == pytest.approx(-outline.min(), rel=1e-5, abs=0.0)
         assert right[place] == pytest.approx(outline.max(), rel=1e-5, abs=0.0)
-        extents = half_extents(HEADED, turn)
+        extents = half_extent(HEADED, turn, -1.0), half_extent(HEADED, turn, 1.0)
         assert (left[place], right[place]) == pytest.approx(extents, rel=1e-12, abs=0.0)
 
 

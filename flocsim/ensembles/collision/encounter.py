@@ -31,7 +31,6 @@ from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.forces.body_forces import random_key, thermal_forces
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.forces.settling import largest_mobility, terminal_motion
-from flocsim.geometry.contact.core_points import Outlines, outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.io.results.schema import SHAPE_MEASURES
 from flocsim.state.scene import Scene
@@ -139,13 +138,6 @@ class Encounter(abc.ABC):
         scene = self.system.scene(laws=self.laws)
         keep(scene, self)
         return scene
-
-    @functools.cached_property
-    def outlines(self) -> Outlines:
-        """Those of i and j."""
-        outlines = outlines_of(self.shapes)
-        keep(outlines, self)
-        return outlines
 
     def keyed(self, *numbers: int) -> "Encounter":
         """Return the same for a replicate whose random forces go by these (seed, replicate)."""

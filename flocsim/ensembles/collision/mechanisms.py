@@ -107,7 +107,7 @@ class Settling(Encounter):
         i, j = self.shapes
         largest = largest_displacement(self.options.delta_max, i, angles[0], j, angles[1])
         offset = share * largest * self.bent
-        place = place_pair(self.shapes, angles, offset, self.start_gap, self.outlines)
+        place = place_pair(self.shapes, angles, offset, self.start_gap, self.scene)
         if isinstance(self.options.start_gap, str):
             # Forces between the centres do not know how thin the outlines are.
             clear = self.size + self.start_gap

@@ -17,9 +17,10 @@ from flocsim.ensembles.config.schema import ZoneConfig
 from flocsim.errors import ZoneError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.base import Force
-from flocsim.geometry.contact.core_points import Outlines, outlines_of
+from flocsim.geometry.contact.core_points import outlines_of
 from flocsim.geometry.contact.near_pairs import core_distance
 from flocsim.geometry.shapes.shape import Shape
+from flocsim.state.scene import Scene
 
 MOST_ADVANCES = 1000
 """Moves towards the wanted gap; each is as long as the distance still allows."""
@@ -28,14 +29,11 @@ LARGEST_RATIO = 4.0 / math.e**2
 """S above which attraction wins at every distance."""
 
 
-def half_extents(shape: Shape, angle: float) -> tuple[float, float]:
-    """Return (towards −x, towards +x) extents of a turned outline about its centroid [m]."""
-    across = math.cos(angle), -math.sin(angle)
-    parts = [(part.radius, part.points @ across) for part in shape.parts]
-    return (
-        max(radius - float(x.min()) for radius, x in parts),
-        max(radius + float(x.max()) for radius, x in parts),
-    )
+def half_extent(shape: Shape, angle: float, side: float) -> float:
+    """Return the extent of a turned outline from its centroid [m], towards +x (``side`` 1) or −x
+    (−1)."""
+    across = side * math.cos(angle), -side * math.sin(angle)
+    return max(part.radius + float((part.points @ across).max()) for part in shape.parts)
 
 
 def half_widths(shape: Shape, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -56,15 +54,15 @@ def largest_displacement(
     ("radius")."""
     if rule == "radius":
         return shape_i.bounding_radius + shape_j.bounding_radius
-    return half_extents(shape_i, angle_i)[1] + half_extents(shape_j, angle_j)[0]
+    return half_extent(shape_i, angle_i, 1.0) + half_extent(shape_j, angle_j, -1.0)
 
 
-def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
+def start_height(bodies, angle_i, angle_j, contact, reach, displacement, gap):
     """Return the height of j's centroid over i's [m] at which the outlines are ``gap`` apart.
 
-    ``outlines``: those of i and j; ``contact`` = r_i + r_j of the spheroradii; ``reach`` =
-    R_i + R_j. From far above, j comes down by the distance that is left (it cannot overshoot);
-    where it passes without coming so near, it starts clear above.
+    ``bodies``: the Scene of i and j, or their Outlines; ``contact`` = r_i + r_j of the
+    spheroradii; ``reach`` = R_i + R_j. From far above, j comes down by the distance that is left
+    (it cannot overshoot); where it passes without coming so near, it starts clear above.
     """
     clear = reach + gap
     height = math.sqrt(max(clear * clear - displacement * displacement, 0.0))
@@ -73,7 +71,7 @@ def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
     # Sphere tracing: the distance at a place is free of contact in any direction.
     for _ in range(MOST_ADVANCES):
         x, y = c * displacement + s * height, c * height - s * displacement
-        left = core_distance(outlines, 1, 0, (turn_c, turn_s, x, y)) - contact - gap
+        left = core_distance(bodies, 1, 0, (turn_c, turn_s, x, y)) - contact - gap
         if left <= 1e-6 * gap:
             return height
         height -= left
@@ -84,14 +82,14 @@ def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
 
 def place_pair(
     shapes: Sequence[Shape], angles: Sequence[float], displacement: float, gap: float,
-    outlines: Outlines | None = None,
+    scene: Scene | None = None,
 ) -> np.ndarray:  # fmt: skip
-    """Return places (2, 3) [m, m, rad] of i at the origin and j above it; ``outlines``: those of
-    the shapes, where they are at hand."""
+    """Return places (2, 3) [m, m, rad] of i at the origin and j above it; ``scene``: that of
+    the two, where it is at hand."""
     contact = shapes[0].radius + shapes[1].radius
     reach = shapes[0].bounding_radius + shapes[1].bounding_radius
     height = compiled(start_height)(
-        outlines or outlines_of(shapes), float(angles[0]), float(angles[1]),
+        scene or outlines_of(shapes), float(angles[0]), float(angles[1]),
         contact, reach, float(displacement), gap,
     )  # fmt: skip
     return np.array([[0.0, 0.0, angles[0]], [displacement, height, angles[1]]])

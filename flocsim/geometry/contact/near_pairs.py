@@ -14,6 +14,7 @@ which the later body provides the vertex.
 import math
 from collections.abc import Callable
 
+from flocsim.compiler.linker import apart
 from flocsim.geometry.contact import points as contacts
 from flocsim.geometry.contact.points import length_of, separation
 from flocsim.geometry.shapes.cores import segment_distance2
@@ -72,6 +73,7 @@ def feature_distance(outlines, b, pose, point, least):
     return least
 
 
+@apart
 def core_distance(outlines, a, b, pose):
     """Return the smallest distance [m] between the cores of two bodies, from core points to edges.
 

@@ -208,7 +208,7 @@ def limit_crossing(scene, work, row, step, before, after):
     ``before`` and ``after`` are the margins L − |ξ| at both ends [m], after < 0. The margin is
     interpolated by the cubic through values and rates there, and its root bisected.
     """
-    side = 1.0 if work.slip[NEW, row] > 0.0 else -1.0
+    side = 1 if work.slip[NEW, row] > 0.0 else -1
     start_rate = step * excess_slip_rate(scene, work, NOW, row, side)
     end_rate = step * excess_slip_rate(scene, work, NEW, row, side)
     before = max(before, 0.0)
