@@ -42,9 +42,9 @@ def pattern_fits(scene, work):
             return False
     # A pair that is missing needs a new pattern; superfluous ones only cost time.
     for pair in range(work.tally.pairs):
-        if is_edge(scene, work, pair):
-            if e.joined[work.pairs[pair].later, work.pairs[pair].earlier] == 0:
-                return False
+        is_joined = e.joined[work.pairs[pair].later, work.pairs[pair].earlier] == 1
+        if is_edge(scene, work, pair) and not is_joined:
+            return False
     return True
 
 
