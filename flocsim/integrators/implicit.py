@@ -23,7 +23,7 @@ from flocsim.integrators.exponential.collocation import (
     may_be_series,
     solve_series,
 )
-from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
+from flocsim.integrators.loop.step_size import adaptive_factor
 from flocsim.integrators.radau.carried_error import release_uncertainty
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.estimate import estimate_error
@@ -34,7 +34,7 @@ from flocsim.integrators.radau.grazing import (
 )
 from flocsim.integrators.radau.stages import TARGET_RATE, evaluate_states, solve_stages
 from flocsim.integrators.radau.systems import factorise_systems
-from flocsim.integrators.rhs.error import end_of_run, error_ratio
+from flocsim.integrators.rhs.error import SMALLEST_FACTOR, end_of_run, error_ratio
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.views import inertia
 from flocsim.state.clock import PLAIN, RADAU, SERIES

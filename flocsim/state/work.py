@@ -106,7 +106,7 @@ class Elimination(NamedTuple):
     joined: Annotated[np.ndarray, ("n", "n"), np.int8]  # 1: the bodies are neighbours
     degree: Annotated[np.ndarray, ("n",), np.int64]  # number of neighbours not eliminated
     cluster: Annotated[np.ndarray, ("n",), np.int64]  # clusters that the pattern is made for
-    pattern: Annotated[np.ndarray, (1,), np.int64]  # 1 + pairs in the pattern; 0: there is none
+    pattern: Annotated[np.ndarray, (1,), np.int64]  # 1 if there is a pattern, else 0
 
 
 class Work(NamedTuple):

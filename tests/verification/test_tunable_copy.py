@@ -34,7 +34,7 @@ def test_modules_defaults_and_local_names_stay():
 
 def test_constants_of_the_engine_are_found_with_their_documentation():
     found = {each.key: each for each in all_constants()}
-    safety = found["integrators.loop.step_size.SAFETY"]
+    safety = found["integrators.rhs.error.SAFETY"]
     assert (safety.kind, safety.value, safety.documented) == (NUMBER, 0.9, True)
     assert found["hooks.BODY_FORCE"].left_out
     assert found["integrators.explicit.NODES"].left_out

@@ -51,16 +51,10 @@ from flocsim.integrators.rhs.views import add_pair_force, tangential_rate, view_
 from flocsim.state.contacts import CLOSED
 from flocsim.state.work import CHANGE, NOW, TRIAL
 
-BOUNDARY_FRACTION = 0.99
-"""Largest fraction of the distance to the boundary of its domain that a quantity may go in an
-iteration (the usual fraction-to-the-boundary rule)."""
-
-MIN_LIMIT = 1e-3
-"""Least friction limit, over that of the spring alone: L must stay positive where the dashpot
-pulls."""
-
 DECIDED_RATIO = 0.01
-"""Ratio of a small quantity to a large one, below which a contact counts as decided or feasible."""
+"""Ratio of a small quantity to a large one, below which a contact counts as decided or feasible.
+What must stay positive keeps at least this share of itself in an iteration (the usual
+fraction-to-the-boundary rule), and a friction limit this share of that of the spring alone."""
 
 
 def is_included(work, row):
@@ -112,7 +106,8 @@ def evaluate_law(scene, work, row, step):
         if 0.0 < slip_cut < math.inf:
             spring, dashpot = sticking_slopes(scene, friction_view, slip_cut, step)
             limit_view = step_view(scene, work, row, step, overlap, slip_cut, abs(rate))
-            limit = max(-contact_force(scene, limit_view)[1], MIN_LIMIT * spring * slip_cut)
+            # L must stay positive where the dashpot pulls.
+            limit = max(-contact_force(scene, limit_view)[1], DECIDED_RATIO * spring * slip_cut)
             limit /= hardness
     # e = k_t (ξ₀ + s h v_t) + damping, over the normal stiffness.
     contact.closed_fraction, _, _ = closed_part_slopes(work, row, limit > 0.0)
@@ -219,7 +214,7 @@ def write_forces(scene, work, step, target):
 
 def keep_positive(fraction, size, change):
     """Return the fraction of a change, at most the given one, that keeps a quantity positive."""
-    return min(fraction, -BOUNDARY_FRACTION * size / change) if change < 0.0 else fraction
+    return min(fraction, (DECIDED_RATIO - 1.0) * size / change) if change < 0.0 else fraction
 
 
 def change_friction(work, row, target, d_limit, fraction, apply):
@@ -286,14 +281,11 @@ def change_pair(work, row, step, target, fraction, apply):
 @apart
 def change_pairs(work, step, target):
     """Change all contacts along with the velocities in CHANGE, each by the largest fraction that
-    keeps it in its domain; return the smallest fraction."""
-    least = 1.0
+    keeps it in its domain."""
     for row in range(work.tally.candidates):
         if is_included(work, row):
             fraction = change_pair(work, row, step, target, 1.0, False)
             change_pair(work, row, step, target, fraction, True)
-            least = min(least, fraction)
-    return least
 
 
 @apart

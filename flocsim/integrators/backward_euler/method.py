@@ -4,10 +4,9 @@ Steps that end at every event suit few contacts. In a bed some contact opens or 
 while nothing moves. So, in a System or Swarm whose bodies touch:
 
 - After every PROBE steps that end at events, Implicit compares. If backward Euler would have
-  needed AHEAD times fewer steps for that time than were tried, it hands over. With fewer bodies
-  than FEWEST the factor is FAR_AHEAD, for a pair of a swarm that vibrates without end.
-- It takes back where nothing touches any more, where PROBE steps had fewer than FEW_SWITCHES
-  events each, and where bodies would rebound by more than the tolerance.
+  needed AHEAD times fewer steps for that time than were tried, it hands over.
+- It takes back where nothing touches any more, where PROBE steps had AHEAD times fewer events, and
+  where bodies would rebound by more than the tolerance.
 
 The rule depends on counts of steps alone. Measured times would differ between machines.
 """
@@ -78,11 +77,8 @@ FEWEST = 3
 PROBE = 60
 """Steps between two comparisons."""
 
-AHEAD, FAR_AHEAD = 4.0, 40.0
-"""Factor by which backward Euler must need fewer steps; and the factor below FEWEST bodies."""
-
-FEW_SWITCHES = 0.25
-"""Events per step across them below which located events cost no more."""
+AHEAD = 4.0
+"""Factor by which backward Euler must need fewer steps."""
 
 
 def largest_change(scene, work):
@@ -103,8 +99,7 @@ def would_pay(scene, work, clock, trials, passed):
     Its error per step is half the step times the change of velocity.
     """
     steps = 1.0 + passed * largest_change(scene, work) / clock.tolerance
-    ahead = AHEAD if work.poses.shape[0] >= FEWEST else FAR_AHEAD
-    return ahead * steps <= trials
+    return AHEAD * steps <= trials
 
 
 def keep_method(scene, work, clock, counts):
@@ -121,7 +116,8 @@ def hand_over(scene, work, clock, counts):
     # Across events: take back where there are few, or nothing touches.
     if clock.across == 1.0:
         enough = trials >= PROBE
-        quiet = enough and clock.switches_since_check < FEW_SWITCHES * trials
+        # Located events need no more steps than there are events.
+        quiet = enough and AHEAD * clock.switches_since_check < trials
         if quiet or least_listed_gap(work) >= 0.0:
             end_at_switches(scene, work, clock)
         elif not enough:

@@ -36,8 +36,8 @@ from flocsim.state.bodies import X, Y
 from flocsim.state.contacts import CLOSED, OPEN
 from flocsim.state.work import CHANGE, NEW, NOW, START, TRIAL
 
-MAX_ITERATIONS = 8
-"""Iterations after which the active sets are taken to be unknown."""
+MAX_ITERATIONS = 50
+"""Iterations after which a search for the end has failed."""
 
 
 def begin_step(work, clock):

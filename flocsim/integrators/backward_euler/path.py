@@ -25,11 +25,11 @@ from flocsim.integrators.backward_euler.interior import (
     write_forces,
 )
 from flocsim.integrators.backward_euler.newton import (
+    MAX_ITERATIONS,
     apply_change,
     assemble_other_derivatives,
     evaluate_included,
     evaluate_other_forces,
-    final_tolerance,
     solve_change,
     solve_end,
 )
@@ -39,22 +39,8 @@ from flocsim.integrators.rhs.views import effective_mass
 from flocsim.state.bodies import X, Y
 from flocsim.state.work import NOW, START, TRIAL
 
-MAX_ITERATIONS = 50
-"""Most iterations."""
-
-SIGMA, SIGMA_FAST, FULL_STEP = 0.05, 0.01, 0.7
-"""Centring parameter: τ over the mean product; SIGMA_FAST after an iteration that made at least
-FULL_STEP of its change."""
-
-MIN_PRODUCT = 1e-10
-"""The smallest τ, over the square of a typical overlap."""
-
-NEWTON_RADIUS = 10.0
-"""Largest last change, over Newton's own tolerance, from which Newton's method finds the end once
-all contacts are decided."""
-
-WARM_FRACTION = 0.03
-"""Square root of the initial products of a warm start, over a typical overlap."""
+SIGMA = 0.01
+"""Centring parameter: τ over the mean product."""
 
 
 def typical_force(scene, work):
@@ -88,7 +74,8 @@ def typical_overlap(scene, work, step):
 def start_contacts(scene, work, step, overlap_scale):
     """Set δ, s and friction of all contacts as they were at the start of the step."""
     # Start on the central path: with one product δ s = τ, none nears its boundary first.
-    target = (WARM_FRACTION * overlap_scale) ** 2
+    # A closed contact of typical overlap is then just decided.
+    target = DECIDED_RATIO * overlap_scale * overlap_scale
     for row in range(work.tally.candidates):
         if is_included(work, row):
             geometry = work.geometry[NOW, row]
@@ -118,40 +105,30 @@ def start_contacts(scene, work, step, overlap_scale):
 
 @apart
 def iterate_once(scene, work, clock, step, target):
-    """Make one iteration towards products τ = ``target``; return (fraction made, change [m]).
+    """Make one iteration towards products τ = ``target``; return False where that fails.
 
-    Bodies go all the way and each contact its own fraction, of which the smallest is returned; −1
-    where the iteration fails.
+    Bodies go all the way, and each contact its own fraction.
     """
     assemble_other_derivatives(scene, work, clock, step)
     write_forces(scene, work, step, target)
-    if not factorise_euler(scene, work, step):
-        return -1.0, math.inf
-    change = solve_change(scene, work, step)
-    if not change < math.inf:
-        return -1.0, math.inf
+    if not factorise_euler(scene, work, step) or not solve_change(scene, work, step) < math.inf:
+        return False
     # Contacts before bodies: their changes are linear in the gaps before the move.
-    fraction = change_pairs(work, step, target)
+    change_pairs(work, step, target)
     apply_change(work)
     evaluate_included(scene, work, clock.time, step)
     widen_slacks(work)
-    return fraction, change
+    return True
 
 
 @apart
 def follow_path(scene, work, clock, step, overlap_scale):
     """Iterate along the central path, and end by Newton's method; return False where that fails."""
-    fraction = 1.0
     for _ in range(MAX_ITERATIONS):
-        # Choose τ by the success of the last iteration.
-        target = (SIGMA_FAST if fraction >= FULL_STEP else SIGMA) * mean_product(work)
-        target = max(target, MIN_PRODUCT * overlap_scale * overlap_scale)
-        fraction, change = iterate_once(scene, work, clock, step, target)
-        if fraction < 0.0:
+        if not iterate_once(scene, work, clock, step, SIGMA * mean_product(work)):
             return False
         # All decided and feasible: Newton's method can finish.
-        near = change <= NEWTON_RADIUS * final_tolerance(scene, work, clock, step)
-        if near and fraction > FULL_STEP and is_decided(work, DECIDED_RATIO * overlap_scale):
+        if is_decided(work, DECIDED_RATIO * overlap_scale):
             return solve_end(scene, work, clock, step)
     return False
 

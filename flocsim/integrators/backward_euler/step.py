@@ -20,6 +20,7 @@ Sources: Moreau (1988), Jean (1999), for contacts that are springs.
 import math
 
 from flocsim.compiler.linker import apart
+from flocsim.constants import TINY
 from flocsim.geometry.contact.points import normal_component
 from flocsim.hooks import CONTACT_FORCE, has
 from flocsim.integrators.backward_euler.contact_mean import takes_part
@@ -31,19 +32,14 @@ from flocsim.integrators.radau.systems import solve_prepared
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
-from flocsim.integrators.rhs.error import error_ratio
+from flocsim.integrators.rhs.error import (
+    LARGEST_FACTOR,
+    SAFETY,
+    SMALLEST_FACTOR,
+    error_ratio,
+)
 from flocsim.integrators.rhs.views import contact_view, inertia, normal_rate, velocity_lifetime_of
 from flocsim.state.work import CHANGE, LAST_RATES, NOW, START, STEP_ERROR, STIFFNESS, TRIAL
-
-SAFETY, MOST_GROWTH, LEAST_SHARE = 0.9, 3.0, 0.1
-"""Safety factor of the next step's size, and bounds of its change."""
-
-CUT_FRACTION = 0.5
-"""A step below this fraction of the planned size was cut short, and says nothing about the next
-one."""
-
-FIRST_LOCATED_STEP = 0.1
-"""Size of the first step with located events after one across them, over that one."""
 
 
 def next_across(clock, step, ratio):
@@ -51,8 +47,8 @@ def next_across(clock, step, ratio):
     events."""
     # An event may have caused the error, which then scales as h.
     if ratio > 1.0:
-        return step * max(LEAST_SHARE, SAFETY / ratio)
-    proposed = step * min(MOST_GROWTH, SAFETY / math.sqrt(max(ratio, 1e-4)))
+        return step * max(SMALLEST_FACTOR, SAFETY / ratio)
+    proposed = step * min(LARGEST_FACTOR, SAFETY / math.sqrt(max(ratio, TINY)))
     # A step cut short by the end of the window says nothing against a longer one.
     return max(clock.step, proposed) if step < clock.step and ratio <= 0.5 else proposed
 
@@ -107,10 +103,8 @@ def euler_step(scene, work, clock, step, all_contacts):
 def note_rates(work, clock, step):
     """Store the rates of an accepted step for the error estimate of the next one; count its
     events."""
-    # A short one, in which a pair has landed, says nothing of how rates go on.
-    clock.rates_known = 1.0 if step > CUT_FRACTION * clock.step else 0.0
-    if clock.rates_known == 1.0:
-        write_rates(work, step)
+    clock.rates_known = 1.0
+    write_rates(work, step)
     for row in range(work.tally.candidates):
         gap_start, gap_end = work.geometry[TRIAL, row].gap, work.geometry[NOW, row].gap
         clock.switches_since_check += 1.0 if (gap_start < 0.0) != (gap_end < 0.0) else 0.0
@@ -127,11 +121,8 @@ def start_across(clock, step):
 def end_at_switches(scene, work, clock):
     """Let steps end at events from now on; set the contact modes by the present gaps and
     displacements."""
-    clock.across, clock.step, clock.checked_at = (
-        0.0,
-        FIRST_LOCATED_STEP * clock.step,
-        math.inf,
-    )
+    clock.across, clock.checked_at = 0.0, math.inf
+    clock.step *= SMALLEST_FACTOR
     # Forget everything about earlier steps.
     clock.previous_step = clock.feasible_step = math.inf
     for row in range(work.tally.candidates):

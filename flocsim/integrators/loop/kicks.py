@@ -33,9 +33,6 @@ SHARE_OF_GAP = 0.25
 """Largest relative displacement of two bodies in a kick (rms), as a fraction of the gap between
 them."""
 
-SAME_TIME = 1e-9
-"""Tolerance for "the step ended with the kick", relative to the kick; to the time: ROUNDING."""
-
 
 def has_kicks(scene):
     """Return True if the scene has random forces."""
@@ -58,8 +55,7 @@ def snap_to_kick_end(scene, work, clock):
     """Set the time to the end of the kick if the step ended there up to rounding."""
     if has_kicks(scene):
         end = kick_end(scene, work)
-        near = SAME_TIME * work.kick.duration * finest_kick(scene)
-        if abs(clock.time - end) <= max(near, ROUNDING * clock.time):
+        if abs(clock.time - end) <= ROUNDING * end:
             clock.time = end
 
 

@@ -18,17 +18,11 @@ from flocsim.integrators.events.samples import HALF_PERIOD
 from flocsim.integrators.exponential.collocation import may_be_series
 from flocsim.integrators.loop.kicks import kick_end
 from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
-from flocsim.integrators.rhs.error import ROUNDING
+from flocsim.integrators.rhs.error import LARGEST_FACTOR, ROUNDING, SAFETY, SMALLEST_FACTOR
 from flocsim.integrators.rhs.views import contact_view, inertia, normal_rate, velocity_lifetime_of
 from flocsim.state.clock import PLAIN, RADAU
 from flocsim.state.contacts import CLOSED
 from flocsim.state.work import MOST_IN_SERIES, NOW, STIFFNESS
-
-SAFETY = 0.9
-"""Fraction of the step at which the error would just meet the tolerance."""
-
-SMALLEST_FACTOR, LARGEST_FACTOR = 0.1, 8.0
-"""Bounds of the change from one step to the next, but behind a switch (`plan`)."""
 
 
 def adaptive_factor(clock, step, ratio, order):

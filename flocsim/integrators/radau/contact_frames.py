@@ -20,9 +20,6 @@ from flocsim.state.bodies import ANGLE, MOST_FRAMES, X, Y
 from flocsim.state.contacts import OPEN
 from flocsim.state.work import CHANGE, FIRST_STAGE, NOW
 
-MIN_FORCE_SHARE = 0.2
-"""Share of a surface force above which the normal of a pair of features counts for the frames."""
-
 MAX_RELATIVE_GAP = 0.1
 """Gap, over the radius of the smaller body, up to which a surface force counts for the frames.
 Forces at larger gaps are not stiff. Following them would rotate the drag, too, which does not
@@ -35,17 +32,17 @@ def is_active(work, row):
     return candidate.contact_mode + candidate.surface_active > 0
 
 
-def defines_frame(scene, work, row):
-    """Return True if a pair's force is stiff enough for its bodies to follow its normal."""
+def frame_weight(scene, work, row):
+    """Return the weight of a pair's normal in the frames of its bodies, 0 where its force is not
+    stiff."""
     candidate = work.candidates[row]
     geometry = work.geometry[NOW, row]
     if candidate.contact_mode != OPEN:
-        return True
-    if candidate.surface_active == 0 or geometry.force_share <= MIN_FORCE_SHARE:
-        return False
+        return 1.0
     a, b = candidate.vertex_body, candidate.edge_body
     size = min(scene.bodies[a].bounding_radius, scene.bodies[b].bounding_radius)
-    return geometry.gap < MAX_RELATIVE_GAP * size
+    stiff = candidate.surface_active == 1 and geometry.gap < MAX_RELATIVE_GAP * size
+    return geometry.force_share if stiff else 0.0
 
 
 def find_root(labels, body):
@@ -90,25 +87,25 @@ def gather_clusters(scene, work):
         work.cluster[body] = work.cluster[work.cluster[body]]
 
 
-def add_pair_to_frames(work, row, stage):
-    """Add the turn of a pair's normal, and the displacement of its contact point, to both
-    bodies."""
+def add_pair_to_frames(work, row, stage, weight):
+    """Add the turn of a pair's normal, and the displacement of its contact point, to both bodies,
+    with a weight."""
     candidate = work.candidates[row]
     g, state = work.geometry, FIRST_STAGE + stage
     a, b = candidate.vertex_body, candidate.edge_body
     change_normal = g[NOW, row].vertex_arm_n - g[state, row].vertex_arm_n
     change_tangential = g[NOW, row].vertex_arm_t - g[state, row].vertex_arm_t
-    add_to_frame(work, row, stage, a, change_normal, change_tangential)
+    add_to_frame(work, row, stage, a, weight, change_normal, change_tangential)
     change_normal = g[NOW, row].edge_arm_n - g[state, row].edge_arm_n
     change_tangential = g[NOW, row].edge_arm_t - g[state, row].edge_arm_t
-    add_to_frame(work, row, stage, b, change_normal, change_tangential)
+    add_to_frame(work, row, stage, b, weight, change_normal, change_tangential)
 
 
-def add_to_frame(work, row, stage, body, change_normal, change_tangential):
+def add_to_frame(work, row, stage, body, weight, change_normal, change_tangential):
     """Add the turn of a pair's normal, and the change of its arm, to the frame of one body."""
     g, state = work.geometry, FIRST_STAGE + stage
     normal_x_start, normal_y_start = g[NOW, row].normal_x, g[NOW, row].normal_y
-    nx, ny = g[state, row].normal_x, g[state, row].normal_y
+    nx, ny = weight * g[state, row].normal_x, weight * g[state, row].normal_y
     frame = work.frames[body, stage]
     # Cosine and sine are summed over pairs and normalised later: the mean of rotations.
     frame.rotation_cosine += normal_x_start * nx + normal_y_start * ny
@@ -155,9 +152,10 @@ def update_frames(scene, work):
             frame = work.frames[body, stage]
             frame.rotation_cosine = frame.rotation_sine = frame.shift_x = frame.shift_y = 0.0
     for row in range(work.tally.candidates):
-        if defines_frame(scene, work, row):
+        weight = frame_weight(scene, work, row)
+        if weight > 0.0:
             for stage in range(3):
-                add_pair_to_frames(work, row, stage)
+                add_pair_to_frames(work, row, stage, weight)
     average_frames(work)
     assign_rotations(work)
 

@@ -17,10 +17,6 @@ from flocsim.integrators.rhs.views import normal_rate, velocity_lifetime_of
 from flocsim.state.contacts import GRAZING, OPEN
 from flocsim.state.work import NOW
 
-LEAST_RESPONSE = 1e-3
-"""Smallest normal response, over the tangential response, of a contact that grazes. With less, the
-tangential force cannot lift the contact."""
-
 
 def any_grazes(work):
     """Return True if a contact grazes."""
@@ -82,13 +78,14 @@ def set_grazing_resistances(scene, work, clock):
         if candidate.contact_mode == GRAZING:
             contact = work.contacts[row]
             lifting, sliding = tangential_response(scene, work, row)
-            # Open where the response is too weak, or where grazing cannot begin.
-            weak = abs(lifting) <= LEAST_RESPONSE * abs(sliding)
+            # Open where the force cannot lift the contact, as the dashpot would be stiffer again
+            # than the system by the same ratio, or where grazing cannot begin.
+            weak = GRAZING_STIFFNESS_RATIO * abs(lifting) <= abs(sliding)
             is_new = contact.newly_grazing != 0.0
             if weak or (is_new and not can_begin_grazing(work, clock, row, lifting, sliding)):
                 candidate.contact_mode, opened = OPEN, True
                 work.slip[NOW, row] = 0.0
             else:
-                # STIFFER times the resistance that the system itself has to a change of the gap.
+                # The ratio times the resistance that the system itself has to a change of the gap.
                 contact.grazing_resistance = GRAZING_STIFFNESS_RATIO / lifting
     return opened

@@ -5,8 +5,9 @@ neighbours of each other by that (fill-in). Chains and trees of bodies have no f
 body of a cluster is eliminated last, because its row holds the momentum balance of the whole
 cluster and would connect all its bodies.
 
-Order and pattern are kept as long as the pairs that act, and the clusters, allow. They are found in
-a table of all bodies by all: n² steps are little beside the systems that a pattern serves.
+Order and pattern are kept as long as the pattern has all pairs that act, and clusters stay. They
+are found in a table of all bodies by all: n² steps are little beside the systems that a pattern
+serves.
 
 Source: George & Liu, SIAM Review 31 (1989), 1, on minimum degree.
 """
@@ -15,10 +16,6 @@ from flocsim.state.clock import BLOCKS_FULL
 
 NONE = -1
 """No body, or no index."""
-
-MAX_PATTERN_RATIO, PATTERN_ALLOWANCE = 1.5, 8
-"""A pattern is kept until it has more than the first number times the pairs that act, plus the
-second."""
 
 
 def is_edge(scene, work, pair):
@@ -35,8 +32,8 @@ def is_leader(work, body):
 
 
 def pattern_fits(scene, work):
-    """Return True if the present pattern contains all acting pairs, and not many more."""
-    e, count = work.elimination, 0
+    """Return True if the present pattern contains all acting pairs."""
+    e = work.elimination
     if e.pattern[0] == 0:
         return False
     # The clusters decide which rows hold momentum balances.
@@ -45,11 +42,10 @@ def pattern_fits(scene, work):
             return False
     # A pair that is missing needs a new pattern; superfluous ones only cost time.
     for pair in range(work.tally.pairs):
-        if is_edge(scene, work, pair):
-            if e.joined[work.pairs[pair].later, work.pairs[pair].earlier] == 0:
-                return False
-            count += 1
-    return e.pattern[0] - 1 <= MAX_PATTERN_RATIO * count + PATTERN_ALLOWANCE
+        is_joined = e.joined[work.pairs[pair].later, work.pairs[pair].earlier] == 1
+        if is_edge(scene, work, pair) and not is_joined:
+            return False
+    return True
 
 
 def join(e, a, b):
@@ -73,7 +69,6 @@ def join_pairs(scene, work):
     for pair in range(work.tally.pairs):
         if is_edge(scene, work, pair):
             join(e, work.pairs[pair].later, work.pairs[pair].earlier)
-            e.pattern[0] += 1
 
 
 def next_body(scene, work):

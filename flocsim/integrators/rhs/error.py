@@ -29,11 +29,18 @@ ITERATION_TOLERANCE = 0.01
 the errors of consecutive series have one sign, and runs become ten times less accurate."""
 
 NEGLIGIBLE = 0.1
-"""Displacement, as a fraction of the tolerance, that contacts which graze may cause unnoticed."""
+"""Fraction of the tolerance below which an error, or a displacement by contacts that graze, counts
+as none."""
 
 FREE_MOTION_FRACTION = 0.01
 """Fraction of the tolerance allowed while no gap is below it. Free motion is cheap to follow, and
 the outcome of the encounter that it leads to depends on nanometres."""
+
+SAFETY = 0.9
+"""Fraction of the step at which the error would just meet the tolerance."""
+
+SMALLEST_FACTOR, LARGEST_FACTOR = 0.1, 8.0
+"""Bounds of the change from one step to the next, but behind a switch (loop/step_size.plan)."""
 
 
 def mean_velocity(work, axis):

@@ -37,6 +37,7 @@ from flocsim.hooks import (
 from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, upper_block
 from flocsim.integrators.rhs.error import set_velocity_lifetimes
 from flocsim.integrators.rhs.friction import limit_slope
+from flocsim.integrators.rhs.orientation import DIFFERENCE, distance_step, oriented_now
 from flocsim.integrators.rhs.outline_sum import has_outline_forces, outline_forces_at, outline_reach
 from flocsim.integrators.rhs.pair_resistance import add_pair_damping
 from flocsim.integrators.rhs.propagated_error import grazing_error_source
@@ -320,9 +321,6 @@ In a contact, attraction is 1e5 times the force that rolls a floc, so an error o
 1e-3 of itself dominates: with 1e-3 Newton's method needed up to sixteen times as many steps.
 """
 
-ORIENTED_DIFFERENCE = 1e-6
-"""Difference step as a fraction of the body's size where only oriented forces act."""
-
 
 def slopes(shifted, here, by):
     """Return the forces and torques of a shifted evaluation less those here, over the shift."""
@@ -352,9 +350,9 @@ def add_outline_derivatives(scene, work, time):
         if here == (0.0, 0.0, 0.0, 0.0):
             continue
         by = OUTLINE_DIFFERENCE * scene.outlines[1]
-        if not outline_reach(scene) > 0.0:
-            by = ORIENTED_DIFFERENCE * scene.bodies[a].bounding_radius
         turn = by / scene.bodies[a].bounding_radius
+        if not outline_reach(scene) > 0.0:
+            by, turn = distance_step(oriented_now(scene, work, time, a, b)), DIFFERENCE
         # Forward differences by x, y and angle of a.
         across = outline_forces_at(scene, work, time, a, b, x + by, y, angle_a, angle_b)
         up = outline_forces_at(scene, work, time, a, b, x, y + by, angle_a, angle_b)

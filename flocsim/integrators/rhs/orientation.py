@@ -8,6 +8,7 @@ differences, of second order in the step.
 
 import math
 
+from flocsim.constants import MINIMUM_GAP
 from flocsim.geometry.contact.points import length_of, separation
 from flocsim.hooks import oriented_energy
 from flocsim.integrators.rhs.views import effective_mass
@@ -15,9 +16,9 @@ from flocsim.state.bodies import ANGLE
 from flocsim.state.views import OrientedView
 from flocsim.state.work import NOW
 
-DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-12
-"""Difference step of angles [rad], and of the distance as a fraction of the gap; lower bound of the
-latter [m]. The error of a central difference is of the order of its square."""
+DIFFERENCE = 1e-4
+"""Difference step of angles [rad], and of the distance as a fraction of the gap. The error of a
+central difference is of the order of its square."""
 
 
 def oriented_view(scene, time, j, i, distance, angle_i, angle_j):
@@ -49,6 +50,11 @@ def energy_at(scene, time, j, i, distance, angle_i, angle_j):
     return oriented_energy(scene, oriented_view(scene, time, j, i, distance, angle_i, angle_j))
 
 
+def distance_step(view):
+    """Return the difference step of the distance [m]; no law varies faster than over d_min."""
+    return DIFFERENCE * max(abs(view.gap), MINIMUM_GAP)
+
+
 def oriented_forces_at(scene, time, j, i, x, y, angle_j, angle_i):
     """Return (fx, fy, torque on j, torque on i) [N, N, N m, N m] on the later body j, seen from i
     at x, y.
@@ -59,7 +65,7 @@ def oriented_forces_at(scene, time, j, i, x, y, angle_j, angle_i):
     distance, one, other = view.centre_distance, view.angle_i, view.angle_j
     if distance == 0.0:
         return 0.0, 0.0, 0.0, 0.0
-    by = DIFFERENCE * abs(view.gap) + LEAST_DIFFERENCE
+    by = distance_step(view)
     # −∂U/∂d, −∂U/∂α_i and −∂U/∂α_j.
     rise = energy_at(scene, time, j, i, distance + by, one, other)
     rise -= energy_at(scene, time, j, i, distance - by, one, other)

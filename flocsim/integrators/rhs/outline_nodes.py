@@ -15,6 +15,7 @@ of the force cost steps.
 import math
 
 from flocsim.compiler.linker import loops_apart
+from flocsim.constants import TINY
 from flocsim.geometry.contact.attraction import arc_ends
 from flocsim.geometry.shapes.pieces import (
     at_parameter,
@@ -29,11 +30,9 @@ from flocsim.state.outlines import (
     MOST_FEET,
 )
 
-SAME_FOOT = 1e-3
-"""Fraction of the gap below which two pieces count as equally near, or two feet as one."""
-
-MOST_BISECTIONS = 40
-"""Bisections along a piece: down to far below any length that matters."""
+SAME_POINT = 1e-3
+"""Fraction of the gap below which two pieces count as equally near, or two feet as one; width of a
+panel, in t, below which its ends count as one."""
 
 MOST_PANELS = 4
 """Panels on one side of a foot."""
@@ -41,12 +40,6 @@ MOST_PANELS = 4
 BEND_RANGE = 30.0
 """Panels end at kinks of the gap up to this multiple of the gap at their foot; those further out do
 not matter."""
-
-LEAST_WIDTH = 1e-3
-"""Least width of a panel, in t."""
-
-LEAST_GROWTH = 1e-6
-"""A gap that grows by less than this fraction of itself counts as constant."""
 
 
 def gap_from(scene, work, x, y):
@@ -68,7 +61,7 @@ def find_feet(scene, work, piece, inset, lens):
         x, y, _, _, metres = at_parameter(piece, parameter)
         gap = distance_to(x, y, other)
         # It is a foot only where that other piece is the nearest.
-        tolerance = SAME_FOOT * (gap + inset)
+        tolerance = SAME_POINT * (gap + inset)
         if gap < lens and gap <= gap_from(scene, work, x, y) + tolerance:
             count = add_foot(work.feet, count, parameter, tolerance / metres)
     return count
@@ -101,14 +94,14 @@ def parameter_to_gap(scene, work, piece, foot, extent, target):
     if beyond <= target:
         return extent
     # Halve the range until its middle is near enough, then interpolate linearly in its outer half.
-    for _ in range(MOST_BISECTIONS):
+    # The foot itself is near enough (find_feet).
+    while True:
         x, y, _, _, _ = at_parameter(piece, foot + 0.5 * extent)
         gap = gap_from(scene, work, x, y)
         if gap <= target:
             return 0.5 * extent * (1.0 + (target - gap) / (beyond - gap))
         beyond = gap
         extent *= 0.5
-    return extent
 
 
 @loops_apart
@@ -183,7 +176,7 @@ def write_side(scene, work, count, piece, foot, growth, end, inset, lens, least)
     extent = min(2.0 * parted_gap / max(root, parted_gap / full_length), full_length)
     x, y, _, _, _ = at_parameter(piece, foot + math.copysign(extent / metres, reach))
     relative_growth = (gap_from(scene, work, x, y) - gap) / parted_gap
-    scale = extent / math.sqrt(max(relative_growth, LEAST_GROWTH))
+    scale = extent / math.sqrt(max(relative_growth, TINY))
     # Panels from kink to kink, the last one to the lens.
     last = graded_parameter(full_length / scale)
     scale, low = math.copysign(scale / metres, reach), 0.0
@@ -230,4 +223,4 @@ def earlier_bend(bend_parameter, foot, scale, low, bend):
     if bend_parameter == math.inf:
         return bend
     t = graded_parameter((bend_parameter - foot) / scale)
-    return t if low + LEAST_WIDTH < t < bend else bend
+    return t if low + SAME_POINT < t < bend else bend

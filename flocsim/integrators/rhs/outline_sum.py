@@ -43,9 +43,9 @@ LENS = 300.0
 the attraction at touch, as the integrand fades out and is compensated for it (attraction.py). A
 narrower lens takes less time per sum, but more steps."""
 
-SKIN, MOST_SKIN = 1.0, 4.0
-"""Pieces are listed up to (1 + SKIN) times the lens, so that lists last, and anew if they reach
-further than (1 + MOST_SKIN) times as far as needed."""
+WIDENING = 2.0
+"""Pieces are listed up to WIDENING times the lens, so that lists last, and anew if they reach
+further than WIDENING² times as far as needed."""
 
 AT_ORIGIN = Pose(0.0, 0.0, 1.0, 0.0)
 """Pose of the body in whose frame the sum is evaluated."""
@@ -221,12 +221,12 @@ def prepare_sum(scene, work, time, a, b, pose):
     needed = max(lens, min(least, reach))
     # Outside the lists, or far within them: list anew, first wide enough to find the least gap,
     # then just the lens.
-    if needed > listed_to or (1.0 + MOST_SKIN) * needed < listed_to:
-        list_near_pieces(scene, work, a, b, pose, (1.0 + SKIN) * reach)
+    if needed > listed_to or WIDENING * WIDENING * needed < listed_to:
+        list_near_pieces(scene, work, a, b, pose, WIDENING * reach)
         least = least_piece_gap(scene, work, pose)
         lens = lens_radius(scene, least)
         if lens > 0.0:
-            list_near_pieces(scene, work, a, b, pose, (1.0 + SKIN) * lens)
+            list_near_pieces(scene, work, a, b, pose, WIDENING * lens)
     radius_a, radius_b = radii_of(scene, a, b)
     reduced = radius_a * radius_b / (radius_a + radius_b)
     sizes = depth_of(scene, a, b), radius_a, radius_b, reduced, effective_mass(scene, a, b)

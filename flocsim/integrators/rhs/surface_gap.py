@@ -17,16 +17,11 @@ import math
 
 from flocsim.geometry.contact.candidates import core_radius, relative_speed
 from flocsim.geometry.contact.points import length_of, locate_polygons, separation, update_rotations
+from flocsim.integrators.rhs.error import ROUNDING
 from flocsim.integrators.rhs.views import centre_line, normal_rate, pair_view
 from flocsim.state.bodies import ANGLE
 from flocsim.state.contacts import OPEN
 from flocsim.state.work import NEW, NOW
-
-SHARE_CUTOFF = 40.0
-"""Pairs with u above the least by more than this have no share: exp(−40) is below rounding."""
-
-LOOK_AHEAD = 1.25
-"""Pairs that could come near in a step longer by this factor are flagged as near."""
 
 
 def smoothing_length(scene, gap):
@@ -58,7 +53,8 @@ def gap_from_scaled(scene, measure):
 
 def share_reach(scene, gap):
     """Return the gap up to which pairs may have a share if the least gap is this one [m]."""
-    return gap_from_scaled(scene, scaled_gap(scene, gap) + SHARE_CUTOFF)
+    # A share exp(u(gap) − u) below rounding is none.
+    return gap_from_scaled(scene, scaled_gap(scene, gap) - math.log(ROUNDING))
 
 
 def pair_end(work, row):
@@ -91,7 +87,7 @@ def flag_near(scene, work, state, step):
     while row < work.tally.candidates:
         end = pair_end(work, row)
         a, b = work.candidates[row].vertex_body, work.candidates[row].edge_body
-        displacement = LOOK_AHEAD * step * relative_speed(scene, work, a, b) if step > 0.0 else 0.0
+        displacement = step * relative_speed(scene, work, a, b) if step > 0.0 else 0.0
         # Both this pair's gap and the least one may change by the displacement.
         reach = share_reach(scene, least_gap(work, state, row, end)) + 2.0 * displacement
         for each in range(row, end):

@@ -37,7 +37,7 @@ from flocsim.forces.drag import follows_shape
 from flocsim.forces.settling import free_mobilities, least_mobility, terminal_motion
 from flocsim.geometry.contact.near_pairs import list_polygons
 from flocsim.geometry.contact.points import locate_polygons, update_rotation
-from flocsim.integrators.rhs.surface_gap import SHARE_CUTOFF, gap_from_scaled, scaled_gap
+from flocsim.integrators.rhs.surface_gap import share_reach
 from flocsim.state.work import NEW, NOW, put_motion, with_room, work_of
 from flocsim.swarms.together.clusters import Neighbours, placed_together
 
@@ -55,7 +55,7 @@ def list_pair(scene, work, pair, gap):
     work.tally.candidates = 0
     cut = 0.0
     if scene.surface_reach > 0.0:
-        cut = gap_from_scaled(scene, scaled_gap(scene, max(gap, 0.0)) + SHARE_CUTOFF)
+        cut = share_reach(scene, max(gap, 0.0))
     if not list_polygons(scene, work, pair, cut):
         return False
     update_rotation(work, NOW, work.pairs[pair].later)
