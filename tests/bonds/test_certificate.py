@@ -66,7 +66,8 @@ def test_a_well_above_the_touch_is_judged_by_the_most_that_it_bears(share):
     # Whatever it bears, no shape holds a sphere: at most it rests, if it does so for long.
     assert not is_hooked(two.scene, two.work, two.bond, pull)
     known = two.scene, two.work, 0.0, two.bond, pull
-    assert [kind_at_rest(*known, rested) for rested in (1.0, 1.0 / NESTED_DISTANCE)] == [NO_BOND, REST]
+    found = [kind_at_rest(*known, rested) for rested in (1.0, 1.0 / NESTED_DISTANCE)]
+    assert found == [NO_BOND, REST]
     assert HOOK not in [kind_at_rest(*known, 1e9)]
 
 
