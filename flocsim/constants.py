@@ -44,8 +44,9 @@ LARGEST_BIAS = 0.03
 """Share by which the smooth gap of two outlines may change a surface force (rhs/surface_gap.py)."""
 
 SHALLOWEST_TOUCH = 1e-12
-"""[m], a hundredth of an atom: bodies that graze each other less deeply do not touch. Scenes that
-graze by construction (δ = δ_max) would otherwise hang on the rounding of their numbers."""
+"""[m], a hundredth of an atom: bodies that graze each other less deeply do not touch, and contact
+points that are nearer to each other coincide. Scenes that graze by construction (δ = δ_max) would
+otherwise hang on the rounding of their numbers."""
 
 TINY = 1e-300
 """Takes the place of a divisor that is zero, so that a quotient stays finite."""

@@ -28,10 +28,7 @@ from flocsim.state.scene import Scene
 from flocsim.state.work import NOW, Work, copy_of, counts_as_pair, motion_of, put_motion, with_room
 
 STEPS_AT_A_TIME = 5_000
-"""Steps between two checks whether to continue: some 50 ms."""
-
-RECORD_ROWS = 4096
-"""Rows of the record between two copies."""
+"""Steps between two checks whether to continue: some 50 ms. The record has a row for each."""
 
 LOOK_AHEAD_TIMES = (0.0, *np.geomspace(1e-16, 1e-4, 25))
 """Times [s] past the end of a run at which forces are evaluated, at constant velocities."""
@@ -94,7 +91,7 @@ class Run:
         self.observed = np.zeros(1) if observed is None else observed
         n = len(scene.bodies)
         # Of fixed size for the compiled loop, which returns when it is full; empty: none is kept.
-        self.record = np.zeros((RECORD_ROWS if record else 0, 1 + 6 * n))
+        self.record = np.zeros((STEPS_AT_A_TIME if record else 0, 1 + 6 * n))
         self.saved = [self.row_now()]
 
     def row_now(self) -> np.ndarray:

@@ -27,7 +27,6 @@ from typing import NamedTuple
 from flocsim.bonds.escape import (
     BARRIER,
     CLIMB_STEP,
-    LEAST_CLIMB_STEP,
     attraction_at,
     can_escape,
     path_length,
@@ -186,12 +185,11 @@ SAFETY = 3.0
 CALM_SPEED = 0.02
 """A pair is calm if its relative speed is below this share of the drift velocity."""
 
-PRYING_RANGE = 0.05
-"""Displacement over distance and squared leverage within which levers stay nearly constant as a
-doublet is pried open: attraction between centres counts only within it."""
-
-REFINEMENT = 0.125
-"""Step of the refined search near the maximum over that of the first search."""
+LEVER_TOLERANCE = 0.05
+"""Tolerance of levers and directions, relative to the size of bodies. A contact at rest may push
+from so far beside its point, over the smaller bounding radius, and has a friction coefficient
+between this and its reciprocal. As a doublet is pried open, attraction between centres counts up to
+this displacement over distance and squared leverage: levers stay nearly constant there."""
 
 
 def is_enough(total, outline_part, centre_part, enough):
@@ -214,12 +212,12 @@ def largest_attraction(scene, work, time, bond, start, end, near, share, enough,
             total, best = centres + surfaces, displacement
         outline_part = max(outline_part, surfaces + min(centres, 0.0))
         if displacement <= near:
-            # Levers stay nearly constant only within ``near`` of the start (PRYING_RANGE).
+            # Levers stay nearly constant only within ``near`` of the start (LEVER_TOLERANCE).
             centre_part = max(centre_part, centres)
         if is_enough(total, outline_part, centre_part, enough):
             break
         length = variation_length(scene, bond, displacement, end)
-        displacement += max(share * length, LEAST_CLIMB_STEP)
+        displacement += share * length
     return total, outline_part, centre_part, best
 
 
@@ -243,7 +241,7 @@ def capacity(scene, work, time, bond, near, enough):
         start, end = max(best - around, 0.0), best + around
         found = total, outline_part, centre_part
         total, outline_part, centre_part, _ = largest_attraction(
-            *known, start, end, near, REFINEMENT * CLIMB_STEP, enough, found
+            *known, start, end, near, CLIMB_STEP * CLIMB_STEP, enough, found
         )
     return total, outline_part, centre_part
 
@@ -281,8 +279,8 @@ def is_held(scene, work, time, bond, load):
     needed = SAFETY * (load.force + mass * spin * spin * bond.distance)
     spheres = are_spheres(scene, bond)
     ratio = 1.0 if spheres else leverage(work, bond, load.lever)
-    # How far out the attraction between centres counts while prying, see PRYING_RANGE.
-    near = PRYING_RANGE * bond.distance / (ratio * ratio)
+    # How far out the attraction between centres counts while prying, see LEVER_TOLERANCE.
+    near = LEVER_TOLERANCE * bond.distance / (ratio * ratio)
     prying_load = needed * ratio if shear < CALM_SPEED * load.drift else math.inf
     enough = needed, -1.0 if spheres else needed, prying_load
     total, outline_part, centre_part = capacity(scene, work, time, bond, near, enough)

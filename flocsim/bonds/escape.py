@@ -7,6 +7,7 @@ centres, of the gap of the outlines, or of both; both widen alike here, as in a 
 import math
 
 from flocsim.compiler.linker import apart
+from flocsim.constants import MINIMUM_GAP
 from flocsim.hooks import CENTRE_FORCE, ORIENTED_ENERGY, centre_force, has, surface_force
 from flocsim.integrators.rhs.outline_sum import has_outline_forces, outline_reach, outline_repulsion
 from flocsim.integrators.rhs.views import pair_view
@@ -15,9 +16,8 @@ BARRIER = 20.0
 """Escape must cost at least this many k_B T: by Kramers' rate thermal motion then takes e^20 = 5e8
 relaxation times."""
 
-CLIMB_STEP, LEAST_CLIMB_STEP = 0.125, 1e-11
-"""Step along the path as a fraction of the length over which forces vary, and its lower bound
-[m]."""
+CLIMB_STEP = 0.125
+"""Step along the path as a fraction of the length over which forces vary."""
 
 
 def forces_at_rest(scene, work, time, a, b, distance, gap, displacement):
@@ -62,7 +62,7 @@ def path_length(scene, bond):
 
 def variation_length(scene, bond, displacement, longest):
     """Return the length over which these forces vary [m]: the smallest of the gaps that they depend
-    on, all wider by a displacement."""
+    on, all wider by a displacement, or MINIMUM_GAP, below which laws are held constant."""
     length = longest
     if has(scene, CENTRE_FORCE):
         length = min(length, abs(bond.distance + displacement - radii_of(scene, bond)))
@@ -70,7 +70,7 @@ def variation_length(scene, bond, displacement, longest):
         length = min(length, abs(bond.surface_gap + displacement))
     if bond.gap + displacement < outline_reach(scene):
         length = min(length, max(bond.gap + displacement, scene.outlines[1]))
-    return length
+    return max(length, MINIMUM_GAP)
 
 
 @apart
@@ -89,7 +89,6 @@ def can_escape(scene, work, time, bond, load, needed):
     while displacement < end:
         # Increments grow with the gap, as attraction varies over a distance of its order.
         increment = CLIMB_STEP * variation_length(scene, bond, displacement, end)
-        increment = max(increment, LEAST_CLIMB_STEP)
         # Midpoint rule.
         centres, outlines = attraction_at(scene, work, time, bond, displacement + 0.5 * increment)
         energy += (centres + outlines - load) * increment

@@ -31,6 +31,7 @@ import math
 from flocsim.bonds.certificate import (
     CALM_SPEED,
     HOOK,
+    LEVER_TOLERANCE,
     NO_BOND,
     REST,
     are_spheres,
@@ -55,10 +56,8 @@ HANGING_COSINE = 0.99
 
 NESTED_DISTANCE = 0.1
 """Centres closer than this share of r_i + r_j are nested: the load has no lever to turn the
-doublet."""
-
-NESTED_REST_TIMES = 10.0
-"""Nested pairs count as bonded after this number of rest times."""
+doublet. Nested pairs turn slower by this factor, and count as bonded after 1/NESTED_DISTANCE rest
+times."""
 
 REST_TURNS = 3.0
 """Automatic rest time, in units of the time (r_i + r_j)/|relative drift|."""
@@ -80,10 +79,10 @@ def has_kept_pose(scene, bond, load, rested):
 
     The load is largest where the faster body hangs straight below. A fixed receiver cannot turn, so
     this is not required of it, nor of loads from all directions. A nest, or a pair across a
-    barrier, must keep its pose for NESTED_REST_TIMES.
+    barrier, must keep its pose for 1/NESTED_DISTANCE rest times.
     """
     near = bond.gap >= 0.0 or bond.distance < NESTED_DISTANCE * radii_of(scene, bond)
-    if near and rested >= NESTED_REST_TIMES:
+    if near and NESTED_DISTANCE * rested >= 1.0:
         return True
     hangs = bond.nx * load.x + bond.ny * load.y >= HANGING_COSINE or (
         load.x == 0.0 and load.y == 0.0
@@ -113,14 +112,6 @@ def kind_at_rest(scene, work, time, bond, load, rested):
     return HOOK if attraction <= load.force and is_hooked(scene, work, bond, load) else REST
 
 
-UNLIMITED_FRICTION = 10.0
-"""Friction coefficient of contacts without a Coulomb limit: a bond that needs |T| > 10 N at a
-contact does not count as held by its shape."""
-
-BALANCE_TOLERANCE = 0.05
-"""Smallest friction coefficient, and half-width of a contact over the smaller bounding radius: a
-pair at rest is within this of its balance."""
-
 EXTREME_FORCES = 4
 """Extreme forces of a contact: both sides of its friction cone, at both ends of its width."""
 
@@ -131,7 +122,7 @@ ROUNDING = 1e-9
 def least_friction(scene, work):
     """Return µ, the smallest ratio |T|/N that the closed contacts can hold.
 
-    At least BALANCE_TOLERANCE; 0 without contacts or contact forces.
+    Between LEVER_TOLERANCE and its reciprocal; 0 without contacts or contact forces.
     """
     least = 0.0
     if not has(scene, CONTACT_FORCE):
@@ -147,8 +138,8 @@ def least_friction(scene, work):
             friction = abs(tangential) / normal if normal > 0.0 else 0.0
             # A law with a tangential force but no Coulomb limit.
             if friction > 0.0 and not limit < math.inf:
-                friction = UNLIMITED_FRICTION
-            friction = min(max(friction, BALANCE_TOLERANCE), UNLIMITED_FRICTION)
+                friction = math.inf
+            friction = min(max(friction, LEVER_TOLERANCE), 1.0 / LEVER_TOLERANCE)
             least = friction if least == 0.0 else min(least, friction)
     return least
 
@@ -169,7 +160,7 @@ def extreme_force(work, bond, size, friction, edge):
     nx, ny = normal_on(work, bond, row)
     x, y = contact_point(work, row, bond.j)
     # The two ends of the contact's width, along the tangent.
-    aside = BALANCE_TOLERANCE * size if edge % 2 == 0 else -BALANCE_TOLERANCE * size
+    aside = LEVER_TOLERANCE * size if edge % 2 == 0 else -LEVER_TOLERANCE * size
     x, y = (x - aside * ny) / size, (y + aside * nx) / size
     # The two sides of the friction cone.
     along = friction if edge % EXTREME_FORCES < 2 else -friction
@@ -200,7 +191,7 @@ def is_allowed(work, bond, size, friction, motion):
         normal, along = nx * ux + ny * uy, nx * uy - ny * ux
         # The least work per normal force, over both sides of the friction cone and both ends of the
         # width.
-        if normal - BALANCE_TOLERANCE * abs(turn) - friction * abs(along) < -ROUNDING:
+        if normal - LEVER_TOLERANCE * abs(turn) - friction * abs(along) < -ROUNDING:
             return False
     return True
 

@@ -22,14 +22,14 @@ from flocsim.errors import KernelError, closest
 from flocsim.forces.base import ContactForce, Force, PairForce
 from flocsim.state.views import BodyView, ContactView, OrientedView, OutlineView, PairView
 
-MOVING = BodyView(
-    1e-3, 2e-6, -3e-6, 0.5, 1e-4, -2e-4, 3.0, 2e-10, 1e-10, 2e-21, 5e-6, 0.6, 0.3,
-    10.0, -20.0, 30.0,
+# A body, and its reverse at time zero and without a long axis.
+SAMPLE_BODIES = tuple(
+    BodyView(
+        1e-3 * later, 2e-6 * sign, -3e-6 * sign, 0.5 * sign, 1e-4 * sign, -2e-4 * sign, 3.0 * sign,
+        2e-10, 1e-10, 2e-21, 5e-6, 0.6 * later, 0.3 * later, 10.0 * sign, -20.0 * sign, 30.0 * sign,
+    )
+    for sign, later in ((1.0, 1.0), (-1.0, 0.0))
 )  # fmt: skip
-SIGNED = ("x", "y", "angle", "vx", "vy", "spin", "kick_x", "kick_y", "kick_turn")
-REVERSED = {name: -getattr(MOVING, name) for name in SIGNED}
-# A body, and its reverse without a long axis.
-SAMPLE_BODIES = MOVING, MOVING._replace(time=0.0, elongation=0.0, long_axis=0.0, **REVERSED)
 SAMPLE_CONTACTS = tuple(
     ContactView(1e-8, rate, slip, -1e5 * slip, 1e-10, 1e-6, 2e-6, 1e-5)
     for rate in (1e-4, -1e-4) for slip in (1e-9, -1e-9)

@@ -16,9 +16,6 @@ from flocsim.state.views import BodyView
 ITERATIONS = 50
 """Newton iterations for the terminal velocity; Stokes drag is linear and needs one."""
 
-REST_SPEED = 1e-6
-"""Share of the terminal speed at which the resistance at rest is evaluated."""
-
 NEGLIGIBLE_RESISTANCE = 0.01
 """A resistance at rest below this share of that in settling counts as zero: a drag such as v²."""
 
@@ -51,14 +48,13 @@ def balance(force, view, parameters, velocity):
     return np.array((fx, fy, torque / r)[: len(velocity)])
 
 
-def derivative(force, view, parameters, velocity, size=0.0):
+def derivative(force, view, parameters, velocity, speed):
     """Return ∂(fx, fy, …)/∂(vx, vy, …) by central differences; NaN if a force is undefined
     there.
 
-    ``size``: their increment [m/s]; by default a thousandth of the largest component.
+    Increments are a thousandth of ``speed`` [m/s], with a floor for a body at rest.
     """
-    # The floor is for a body at rest.
-    size = size or 1e-3 * np.abs(velocity).max() + 1e-9
+    size = 1e-3 * speed + 1e-9
     columns = []
     try:
         for step in np.eye(len(velocity)) * size:
@@ -76,15 +72,14 @@ def forces_on_lone(system: Any, body: Body) -> tuple[Any, BodyView, list[float]]
     return pieces.laws.get("body_force", no_force), lone_view(system, body), pieces.parameters
 
 
-def resistance(system: Any, body: Body, speed: float, size: float) -> float:
+def resistance(system: Any, body: Body, speed: float) -> float:
     """Return the derivative of the body forces with respect to speed along gravity [kg/s].
 
-    ``speed`` [m/s] is relative to the flow at the origin; ``size``: increment of the difference.
-    NaN if a force is undefined there.
+    ``speed`` [m/s] is relative to the flow at the origin. NaN if a force is undefined there.
     """
     u, v = system.fluid.velocity
     velocity = np.array((u, v - speed))
-    return -float(derivative(*forces_on_lone(system, body), velocity, size)[1, 1])
+    return -float(derivative(*forces_on_lone(system, body), velocity, speed)[1, 1])
 
 
 @np.errstate(all="ignore")
@@ -100,7 +95,7 @@ def largest_mobility(system: Any, body: Body, speed: float, mobility: float) -> 
         return mobility
     if drag.follows_shape(system.forces):
         return free_mobilities(system, body)[1]
-    at_rest = resistance(system, body, 0.0, REST_SPEED * speed + 1e-9)
+    at_rest = resistance(system, body, 0.0)
     # The mobility is 1/resistance, so that the product is the ratio of the two resistances.
     return max(mobility, 1.0 / at_rest) if at_rest * mobility > NEGLIGIBLE_RESISTANCE else mobility
 
@@ -117,7 +112,7 @@ def least_mobility(system: Any, body: Body, speed: float, mobility: float) -> fl
         return mobility
     if drag.follows_shape(system.forces):
         return nonrotating_mobility(system, body)
-    there = resistance(system, body, speed, 1e-3 * speed + 1e-9)
+    there = resistance(system, body, speed)
     return min(mobility, 1.0 / there) if 0.0 < there < math.inf else mobility
 
 
@@ -139,12 +134,13 @@ def free_mobilities(system: Any, body: Body) -> tuple[float, float]:
 def describe_undefined_force(system, body, velocity):
     """Describe which body force is undefined at or around a velocity."""
     at = f"a velocity of ({velocity[0]:.3g}, {velocity[1]:.3g}) m/s"
+    speed = np.abs(velocity).max()
     # Evaluate each force by itself: a sum does not tell which of its terms is NaN.
     for force in system.pieces.used.values():
         own = laws_of([force], system.fluid)
         law = own.laws.get("body_force")
         known = (law, lone_view(system, body), own.parameters)
-        if law is not None and not np.isfinite(derivative(*known, velocity)).all():
+        if law is not None and not np.isfinite(derivative(*known, velocity, speed)).all():
             return f"{where(force.kernel_in(system.fluid))} gives no number at {at}"
     return f"the body forces overflow at {at}"
 
@@ -163,7 +159,7 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
     velocity = np.zeros(3 if drag.follows_shape(system.forces) else 2)
     # Newton's method from rest.
     for _ in range(ITERATIONS):
-        slope = derivative(*known, velocity)
+        slope = derivative(*known, velocity, np.abs(velocity).max())
         if not np.isfinite(slope).all():
             raise UsageError(
                 f"no terminal velocity: {describe_undefined_force(system, body, velocity)}"

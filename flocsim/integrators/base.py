@@ -8,6 +8,7 @@ from enum import IntEnum
 import attrs
 
 from flocsim import hooks
+from flocsim.fields import quantity
 from flocsim.state.clock import NEVER, Clock, Counts
 
 
@@ -165,3 +166,20 @@ class Integrator(ABC):
         # 0: a method that may hand over begins to compare its progress at once.
         next_check = 0 if self.hands_over else NEVER
         return Counts.one(max_steps=max_steps, pause_at=NEVER, next_check=next_check)
+
+
+@attrs.frozen
+class Adaptive(Integrator):
+    """Base class of integrators with error control.
+
+    Parameters
+    ----------
+    tolerance : float
+        Largest error of a step [m], > 0: displacement of any point of an outline, including the
+        displacement that the error of the velocity leads to later.
+    first_step : float
+        Size of the first step [s], > 0.
+    """
+
+    tolerance: float = quantity("m", above=0.0, default=1e-9)
+    first_step: float = quantity("s", above=0.0, default=1e-6)

@@ -6,8 +6,7 @@ They solve no linear systems, and are limited to steps of a few 1/ω of the stif
 
 import attrs
 
-from flocsim.fields import quantity
-from flocsim.integrators.base import Integrator
+from flocsim.integrators.base import Adaptive
 from flocsim.integrators.loop.step_size import adaptive_factor
 from flocsim.integrators.parts import (
     FixedStep,
@@ -98,7 +97,7 @@ def evaluate_stages(scene, work, time, step):
 
 
 @attrs.frozen
-class DormandPrince54(Integrator):
+class DormandPrince54(Adaptive):
     """Explicit Runge–Kutta method of order 5 with error control, for scenes that are not stiff.
 
     Steps end where a contact opens, closes, sticks or slides, so that the forces are smooth inside
@@ -117,9 +116,6 @@ class DormandPrince54(Integrator):
     Source: Dormand & Prince (1980), as in Hairer, Nørsett & Wanner, Solving Ordinary Differential
     Equations I (1993), table II.5.2.
     """
-
-    tolerance: float = quantity("m", above=0.0, default=1e-9)
-    first_step: float = quantity("s", above=0.0, default=1e-6)
 
     @staticmethod
     def attempt(scene, work, clock, step):

@@ -14,10 +14,9 @@ from collections.abc import Callable
 
 import attrs
 
-from flocsim.fields import quantity
 from flocsim.integrators.backward_euler.method import step_or_give_back
 from flocsim.integrators.backward_euler.step import next_across
-from flocsim.integrators.base import Integrator
+from flocsim.integrators.base import Adaptive
 from flocsim.integrators.exponential.collocation import (
     estimate_series_error,
     may_be_series,
@@ -56,7 +55,7 @@ def is_retry(scene, clock):
 
 
 @attrs.frozen
-class Implicit(Integrator):
+class Implicit(Adaptive):
     """Adaptive implicit method, stable for contacts of any stiffness: the default.
 
     For up to six bodies, steps that resolve the fastest vibration are a power series: exact for
@@ -81,9 +80,6 @@ class Implicit(Integrator):
 
     estimate_share = 0.5
     hands_over = True
-
-    tolerance: float = quantity("m", above=0.0, default=1e-9)
-    first_step: float = quantity("s", above=0.0, default=1e-6)
 
     @staticmethod
     def attempt(scene, work, clock, step):

@@ -18,7 +18,7 @@ from flocsim.bonds.certificate import (
     is_certain,
     is_certain_in_kicks,
 )
-from flocsim.bonds.rest import NESTED_REST_TIMES, is_hooked, kind_at_rest
+from flocsim.bonds.rest import NESTED_DISTANCE, is_hooked, kind_at_rest
 from flocsim.constants import BOLTZMANN
 from flocsim.forces import Contact, VanDerWaals
 from tests.helpers.hydration import Hydration
@@ -66,7 +66,8 @@ def test_a_well_above_the_touch_is_judged_by_the_most_that_it_bears(share):
     # Whatever it bears, no shape holds a sphere: at most it rests, if it does so for long.
     assert not is_hooked(two.scene, two.work, two.bond, pull)
     known = two.scene, two.work, 0.0, two.bond, pull
-    assert [kind_at_rest(*known, rested) for rested in (1.0, NESTED_REST_TIMES)] == [NO_BOND, REST]
+    found = [kind_at_rest(*known, rested) for rested in (1.0, 1.0 / NESTED_DISTANCE)]
+    assert found == [NO_BOND, REST]
     assert HOOK not in [kind_at_rest(*known, 1e9)]
 
 

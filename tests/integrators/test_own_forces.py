@@ -151,7 +151,7 @@ def colliding(integrator):
 def test_a_record_in_pieces_equals_one_in_one_piece(integrator, monkeypatch):
     scene = colliding(integrator)
     whole = scene.run(3e-4)
-    monkeypatch.setattr(run, "RECORD_ROWS", 7)
+    monkeypatch.setattr(run, "STEPS_AT_A_TIME", 7)
     pieces = scene.run(3e-4)
     assert len(whole.t) > 3 * 7
     for name in ("t", "position", "velocity"):
@@ -162,7 +162,7 @@ def test_a_record_in_pieces_equals_one_in_one_piece(integrator, monkeypatch):
 @pytest.mark.slow
 def test_more_rows_than_the_record_holds():
     found = PolygonSystem(crowd(3), own(), VelocityVerlet(5e-8)).run(5e-4)
-    assert found.steps > 2 * run.RECORD_ROWS
+    assert found.steps > 2 * run.STEPS_AT_A_TIME
     assert len(found.t) == found.steps + 1
     assert np.all(np.diff(found.t) > 0.0)
     assert np.allclose(np.diff(found.t)[:-1], 5e-8, rtol=1e-6)

@@ -49,7 +49,7 @@ from flocsim.bonds.certificate import (
     pose_change,
 )
 from flocsim.bonds.escape import forces_at_rest, radii_of
-from flocsim.bonds.rest import NESTED_REST_TIMES, STABLE_POSE, is_swinging, kind_at_rest
+from flocsim.bonds.rest import NESTED_DISTANCE, STABLE_POSE, is_swinging, kind_at_rest
 from flocsim.geometry.contact.near_pairs import core_distance, gap_between, pose_of
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.hooks import (
@@ -344,7 +344,7 @@ def is_held_apart(scene, work, observed, time):
     """Return True if two that never touched stay where they are: without kicks, as they have kept
     still for far longer than the rest time; in a secondary minimum, if kicks do not lead out."""
     if observed[KICK_ENERGY] == 0.0:
-        return rest_of(scene, work, observed, time, load_on(observed)) >= NESTED_REST_TIMES
+        return NESTED_DISTANCE * rest_of(scene, work, observed, time, load_on(observed)) >= 1.0
     if observed[CAGE_HIGH] <= observed[CAGE_LOW]:
         return False
     bond = bond_between(scene, work, time, BODY_I, BODY_J)

@@ -38,6 +38,7 @@ import numpy as np
 
 from flocsim.compiler.composer import compiled
 from flocsim.compiler.linker import loops_apart
+from flocsim.constants import TINY
 from flocsim.geometry.shapes.pieces import (
     Pose,
     at_parameter,
@@ -45,19 +46,11 @@ from flocsim.geometry.shapes.pieces import (
     piece_at,
     placed,
 )
-
-ARC_ORDER = 8
-"""Nodes of Gauss's rule for an arc that its series cannot have."""
-
-NO_ATTRACTION = 1e3
-"""Plate gap [m] that stands for no attraction."""
+from flocsim.state.outlines import MOST_ORDER
 
 SERIES_LIMIT = 0.7
 """Largest w = sin²(φ/2) at which the series in w is used; arcs that extend further are integrated
 by Gauss's rule."""
-
-# Coefficients of (1 − w)^{−1/2} in powers of w.
-ROOT_SERIES = (1.0, 0.5, 0.375, 0.3125, 0.2734375, 0.24609375)
 
 CUBE_ROOT = (2.48719599, -4.51910029, 4.92375927, -1.86079247)
 """Coefficients of r^{−1/3} in powers of r, within 4 % for r from 0.1 to 1.25: start of an
@@ -115,8 +108,8 @@ def add_segment(nodes, count, piece, inset, lens):
 def arc_by_gauss(x, y, rules, piece, radius, lens):
     """Return S of an arc by Gauss's rule; x, y as seen from its centre."""
     total = 0.0
-    for k in range(ARC_ORDER):
-        node, weight = rules[ARC_ORDER, 0, k], rules[ARC_ORDER, 1, k]
+    for k in range(MOST_ORDER):
+        node, weight = rules[MOST_ORDER, 0, k], rules[MOST_ORDER, 1, k]
         # The arc is parametrised by t = tan(φ/2) from its middle.
         t = piece.half * node
         denominator = 1.0 + t * t
@@ -160,19 +153,19 @@ def arc_by_series(p, radius, distance, low, high):
     v, v_2 = sign * v, sign_2 * v_2
     cube, cube_2 = v * v * v, v_2 * v_2 * v_2
     rest, times = v - v_2 - (cube_2 - cube) / 3.0, 1.0
+    # Powers of 1/(4 R q) times the coefficients (2k − 1)/(2k) … 1/2 of (1 − w)^{−1/2}.
     bend, share = 0.5 / radius, 0.25 / (radius * distance)
-    factor = share * ROOT_SERIES[1]
+    factor = 0.5 * share
     total = (bend * first - p * zeroth + factor * (3.0 * bend * rest - p * first)) / 3.0
     logarithm = factor * bend
-    factor = share * share
     for k in range(2, 5):
+        factor *= share * (k - 0.5) / k
         cube, cube_2 = cube * start * start, cube_2 * end * end
         down, falling = 1.0 / (2 * k - 2), (2 * k + 1) * squared
         next_rest, next_times = down * (cube_2 - cube - falling * rest), -down * falling * times
-        total += ROOT_SERIES[k] * factor * (bend * next_rest - p * rest)
-        logarithm += ROOT_SERIES[k] * factor * (bend * next_times - p * times)
+        total += factor * (bend * next_rest - p * rest)
+        logarithm += factor * (bend * next_times - p * times)
         rest, times = next_rest, next_times
-        factor *= share
     root = math.sqrt(radius / distance)
     return root * total, root * logarithm, ratio
 
@@ -266,9 +259,8 @@ def convert_to_plate_gaps(nodes, count, inset, lens):
         nodes.plate_gap[k] = shifted_gap * root if known else -1.0
     for k in range(count):
         if nodes.plate_gap[k] < 0.0:
-            cube = nodes.attraction[k]
-            far = cube ** (-1.0 / 3.0) if cube > 0.0 else NO_ATTRACTION
-            nodes.plate_gap[k] = min(far, NO_ATTRACTION)
+            # Without attraction plates are too far apart for any.
+            nodes.plate_gap[k] = max(nodes.attraction[k], TINY) ** (-1.0 / 3.0)
 
 
 def finite_depth_factor(distance, depth):

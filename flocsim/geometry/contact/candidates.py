@@ -10,6 +10,7 @@ passed to the neighbouring pair of features as a contact rolls from one edge to 
 
 import math
 
+from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.geometry.contact.body_pairs import (
     list_pairs,
     lists_all_pairs,
@@ -29,16 +30,11 @@ from flocsim.state.contacts import GRAZING
 from flocsim.state.work import NOW, PROPAGATED
 
 SKIN = 0.1
-"""Smallest skin over r_i + r_j (spheroradii).
-
-The skin is the larger of this, and of the smaller of SKIN_OF_EDGE and SKIN_OF_SIZE.
-"""
+"""Smallest skin over r_i + r_j (spheroradii), and largest one over the smaller bounding radius, for
+coarse polygons."""
 
 SKIN_OF_EDGE = 0.3
-"""Skin over the mean edge length: few pairs are listed, yet lists last."""
-
-SKIN_OF_SIZE = 0.1
-"""Skin over the smaller bounding radius, an upper bound for coarse polygons."""
+"""Skin over the mean edge length, within these bounds: few pairs are listed, yet lists last."""
 
 STEPS_PER_LIST, MOST_WIDENING = 2.2, 12.0
 """STEPS_PER_LIST: list for so many steps at the present speed. MOST_WIDENING: at most so many times
@@ -51,9 +47,6 @@ step.
 EXCESS_WIDTH = 4.0
 """Lists of few bodies are rebuilt if their budget is so many times the needed skin: after a long
 flight an impact would otherwise carry its long list."""
-
-SAME_POINT = 1e-6
-"""Contact points closer than this share of r_i + r_j coincide (up to four pairs at a corner)."""
 
 MOST_SPENT, LEAST_SPENT = 0.8, 0.1
 """MOST_SPENT: share of its budget that a pair of few bodies may spend by the end of a step.
@@ -79,7 +72,7 @@ def skin_of(scene, work, a, b, ahead):
     size = min(scene.bodies[a].bounding_radius, scene.bodies[b].bounding_radius)
     edge = min(edge_length(scene, a), edge_length(scene, b))
     contact = scene.bodies[a].radius + scene.bodies[b].radius
-    skin = max(SKIN * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * size))
+    skin = max(SKIN * contact, min(SKIN_OF_EDGE * edge, SKIN * size))
     return widened_skin(skin, relative_speed(scene, work, a, b) * ahead)
 
 
@@ -112,7 +105,7 @@ def largest_cutoff(scene, work, ahead):
             edge = max(edge, edge_length(scene, body))
             fastest = max(fastest, outline_speed(scene, work, body))
         contact = max(contact, scene.bodies[body].radius)
-    skin = max(SKIN * 2.0 * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * largest))
+    skin = max(SKIN * 2.0 * contact, min(SKIN_OF_EDGE * edge, SKIN * largest))
     reach = max(0.0, scene.listed_reach, scene.centre_reach)
     return reach + widened_skin(skin, 2.0 * fastest * ahead)
 
@@ -413,10 +406,10 @@ def successor_of(scene, work, row):
             ox, oy = contact_point(work, other, low)
             distance = math.hypot(ox - x, oy - y)
             own = abs(work.slip[NOW, other])
-            # Points closer than SAME_POINT count as equally near: the displacement decides between
-            # them.
-            nearer = distance < least - SAME_POINT * near
-            if not (nearer or (distance <= least + SAME_POINT * near and own < displaced)):
+            # Points closer than SHALLOWEST_TOUCH count as equally near: the displacement decides
+            # between them.
+            nearer = distance < least - SHALLOWEST_TOUCH
+            if not (nearer or (distance <= least + SHALLOWEST_TOUCH and own < displaced)):
                 continue
             if distance <= near or are_neighbours(scene, work, row, other):
                 successor, least, displaced = other, min(distance, least), own

@@ -45,9 +45,6 @@ THIN_LAYER = 60.0
 MOST_CHARGES = 20_000
 """Largest number of charges of an outline: solving for them takes seconds."""
 
-SOLVE_RANGE = 16.0
-"""κρ beyond which a charge is neglected when solving for charges."""
-
 MERGE_DISTANCE = 0.15
 """Charges closer than this (in units of `unit_of`), as behind reflex corners, are merged: two would
 grow without bound with opposite signs."""
@@ -56,13 +53,11 @@ DENSE = 2000
 """Up to this number of charges the system is dense, beyond that sparse."""
 
 GRID_STEP = 0.3
+"""Distance of the nodes of a field (in units of `unit_of`)."""
 
 LAYER_REACH = 12.0
 """Distance in Debye lengths beyond which charges are neglected: e^−12 = 6e-6 of the force at
 contact."""
-
-FIELD_DEPTH = 1.0
-"""Depth behind an outline (in units of `unit_of`) to which the field is tabulated."""
 
 LEAST_SQUARED = 1e-4
 """Lower bound of (κρ)² in the field of a charge, which diverges at ρ = 0."""
@@ -114,7 +109,7 @@ def check_length(shape: Shape, kappa: float) -> None:
         raise too_long(shape, kappa, f"{counts.sum():.3g} charges, of {MOST_CHARGES}")
 
 
-def points_of(pieces, kappa, times=1):
+def points_of(pieces, kappa, times):
     """Return points on an outline (n, 2) and the positions of charges behind them (n, 2) [m].
 
     ``times``: number of points per charge.
@@ -147,13 +142,13 @@ def charges_of_shape(shape: Shape, kappa: float) -> np.ndarray:
 
     check_length(shape, kappa)
     pieces = pieces_of_shape(shape)
-    places = without_close(points_of(pieces, kappa)[1], MERGE_DISTANCE * unit_of(shape, kappa))
+    places = without_close(points_of(pieces, kappa, 1)[1], MERGE_DISTANCE * unit_of(shape, kappa))
     points, _ = points_of(pieces, kappa, 2)
-    # The potential of each unit charge at each point. K₀(16) = 3.5e-8: far ones can be dropped.
+    # The potential of each unit charge at each point; far ones can be dropped.
     if len(places) <= DENSE:
         matrix, solve = k0(kappa * distances(points, places)), np.linalg.solve
     else:
-        trees, far = (cKDTree(points), cKDTree(places)), SOLVE_RANGE / kappa
+        trees, far = (cKDTree(points), cKDTree(places)), LAYER_REACH / kappa
         near = trees[0].sparse_distance_matrix(trees[1], far, output_type="coo_matrix")
         near.data = k0(kappa * near.data)
         matrix, solve = near.tocsc(), spsolve
@@ -336,19 +331,19 @@ def tiles_around(shape, kappa, step):
     """Return (lower left corner, (across, up), whether each tile has nodes) around a shape."""
     from scipy.spatial import cKDTree
 
-    points, places = points_of(pieces_of_shape(shape), kappa)
+    points, places = points_of(pieces_of_shape(shape), kappa, 1)
     width, reach = TILE * step, LAYER_REACH / kappa
     low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
     counts = np.ceil((high - low) / width).astype(int)
     x, y = (low[k] + width * (np.arange(counts[k]) + 0.5) for k in range(2))
     middles = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     # Three quarters of a side cover the distance from a tile's middle to its corners.
-    most, inside = reach + 0.75 * width, FIELD_DEPTH * unit_of(shape, kappa) + 0.75 * width
+    most, inside = reach + 0.75 * width, CHARGE_DEPTH * unit_of(shape, kappa) + 0.75 * width
     distance, nearest = cKDTree(points).query(middles, distance_upper_bound=most)
     used = np.isfinite(distance)
     nearest = nearest[used]
     outward = points[nearest] - places[nearest]
-    # Tiles further behind the outline than FIELD_DEPTH are not tabulated.
+    # Tiles further behind the outline than its charges are not tabulated.
     behind = np.sum((middles[used] - points[nearest]) * outward, axis=1) < 0.0
     used[used] = ~behind | (distance[used] < inside)
     return low, counts, used

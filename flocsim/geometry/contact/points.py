@@ -27,7 +27,7 @@ from itertools import combinations, product
 import numpy as np
 
 from flocsim.compiler.linker import apart
-from flocsim.constants import DEEPEST_OVERLAP, TINY
+from flocsim.constants import DEEPEST_OVERLAP, SHALLOWEST_TOUCH, TINY
 from flocsim.geometry.shapes.cores import Part, closest_share, edges_of, from_edges
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.shapes.shape import Shape
@@ -40,9 +40,6 @@ ANGLES_PER_RADIAN = 64.0
 
 LARGEST_ANGLE = 1e6
 """Angle [rad] beyond which the library functions are used."""
-
-TOUCHING = 1e-12
-"""Gap [m] below which outlines are reported as touching."""
 
 
 def length_of(x, y):
@@ -307,7 +304,7 @@ def overlap_fault(
 def touching_points(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: float) -> np.ndarray:
     """Return the contact points (c, 2) [m] of two placed rings (N, 2) with their spheroradii.
 
-    Gaps below TOUCHING count: a step that ends at a first touch ends on either side of it.
+    Gaps below SHALLOWEST_TOUCH count: a step that ends at a first touch ends on either side of it.
     """
     points_found = []
     # Vertices of each ring against edges of the other, as in the vertex–edge method.
@@ -319,7 +316,7 @@ def touching_points(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: flo
         normal = offsets / np.maximum(distance, 1e-300)[..., None]
         feet = points[:, None] - offsets
         middle = feet + normal * (0.5 * (distance + other - radius))[..., None]
-        points_found.append(middle[distance < radius + other + TOUCHING])
+        points_found.append(middle[distance < radius + other + SHALLOWEST_TOUCH])
     return np.concatenate(points_found)
 
 

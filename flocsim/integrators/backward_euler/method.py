@@ -16,7 +16,6 @@ import math
 import attrs
 
 from flocsim.compiler.linker import apart, postponed
-from flocsim.fields import quantity
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.hooks import CONTACT_FORCE, has, hook
 from flocsim.integrators.backward_euler.step import (
@@ -25,7 +24,7 @@ from flocsim.integrators.backward_euler.step import (
     next_across,
     start_across,
 )
-from flocsim.integrators.base import Integrator
+from flocsim.integrators.base import Adaptive
 from flocsim.integrators.rhs.views import lever
 from flocsim.state.clock import NEVER, NOT_COMPILED
 from flocsim.state.work import AT_LAST_CHECK, NOW
@@ -35,7 +34,7 @@ RESOLVED_BOUNCE = 0.003
 
 
 @attrs.frozen
-class BackwardEuler(Integrator):
+class BackwardEuler(Adaptive):
     """Backward Euler with the contacts of each step's end, of order 1: for beds at rest.
 
     Steps go on across any number of events. Impacts from which bodies would rebound by more than
@@ -55,8 +54,6 @@ class BackwardEuler(Integrator):
     """
 
     across = True
-    tolerance: float = quantity("m", above=0.0, default=1e-9)
-    first_step: float = quantity("s", above=0.0, default=1e-6)
 
     @staticmethod
     def attempt(scene, work, clock, step):

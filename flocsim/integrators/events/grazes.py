@@ -12,8 +12,7 @@ tolerance resolves all this.
 import math
 
 from flocsim.compiler.linker import apart
-from flocsim.constants import TINY
-from flocsim.geometry.contact.candidates import SAME_POINT
+from flocsim.constants import SHALLOWEST_TOUCH, TINY
 from flocsim.geometry.contact.points import contact_point, length_of
 from flocsim.hooks import contact_derivatives, contact_force
 from flocsim.integrators.events.resolution import RESOLUTION
@@ -79,11 +78,10 @@ def tangential_stiffness(scene, view):
 
 def same_point(work, row, other):
     """Return True if two rows have the same contact point."""
-    candidate = work.candidates[row]
-    x, y = contact_point(work, row, candidate.vertex_body)
-    other_x, other_y = contact_point(work, other, candidate.vertex_body)
-    near = SAME_POINT * (candidate.vertex_radius + candidate.edge_radius)
-    return length_of(other_x - x, other_y - y) < near
+    body = work.candidates[row].vertex_body
+    x, y = contact_point(work, row, body)
+    other_x, other_y = contact_point(work, other, body)
+    return length_of(other_x - x, other_y - y) < SHALLOWEST_TOUCH
 
 
 def coincides(work, row, other):

@@ -18,7 +18,7 @@ from flocsim.bonds.certificate import (
     energy_of,
     is_held,
 )
-from flocsim.bonds.rest import HANGING_COSINE, NESTED_DISTANCE, NESTED_REST_TIMES, STABLE_POSE
+from flocsim.bonds.rest import HANGING_COSINE, NESTED_DISTANCE, STABLE_POSE
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.ensembles.collision.outcomes import BOUND, bond_of, load_on, start_rest, watch_pair
@@ -242,9 +242,9 @@ def test_a_nest_is_bound_after_ten_rest_times(tmp_path):
     doublet = nested(tmp_path, overrides, radius=23.4e-6)
     reach = sum(shape.equivalent_radius for shape in doublet.shapes)
     for x, turns, expected in (
-        (0.98 * NESTED_DISTANCE * reach, 0.99 * NESTED_REST_TIMES, False),
-        (0.98 * NESTED_DISTANCE * reach, 1.01 * NESTED_REST_TIMES, True),
-        (1.1 * NESTED_DISTANCE * reach, 1.01 * NESTED_REST_TIMES, False),
+        (0.98 * NESTED_DISTANCE * reach, 0.99 / NESTED_DISTANCE, False),
+        (0.98 * NESTED_DISTANCE * reach, 1.01 / NESTED_DISTANCE, True),
+        (1.1 * NESTED_DISTANCE * reach, 1.01 / NESTED_DISTANCE, False),
     ):
         # Away from the slit.
         doublet.place((0.0, 0.0, 0.0), (-x, 0.0, 0.0))

@@ -38,7 +38,7 @@ def test_cylinders(radius, gap):
 def single_layer(shape, elements):
     """(middles (n, 2), lengths, σ/ε) of an outline at potential 1 and κ = 1: σ constant along each
     element, potentials in their middles."""
-    points, _ = charges.points_of(charges.pieces_of_shape(shape), elements)
+    points, _ = charges.points_of(charges.pieces_of_shape(shape), elements, 1)
     places, lengths = [], []
     ends = np.roll(points, -1, axis=0)
     # Pieces do not follow each other: an element joins two neighbours of a piece only.
