@@ -187,8 +187,8 @@ CALM_SPEED = 0.02
 
 LEVER_TOLERANCE = 0.05
 """Tolerance of levers and directions, relative to the size of bodies. A contact at rest may push
-from so far beside its point, over the smaller bounding radius, and has a friction coefficient
-between this and its reciprocal. As a doublet is pried open, attraction between centres counts up to
+from so far beside its point, over the smaller bounding radius, and has at least this friction
+coefficient. As a doublet is pried open, attraction between centres counts up to
 this displacement over distance and squared leverage: levers stay nearly constant there."""
 
 

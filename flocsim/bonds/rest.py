@@ -112,6 +112,10 @@ def kind_at_rest(scene, work, time, bond, load, rested):
     return HOOK if attraction <= load.force and is_hooked(scene, work, bond, load) else REST
 
 
+UNLIMITED_FRICTION = 10.0
+"""Friction coefficient of contacts without a Coulomb limit: a bond that needs |T| > 10 N at a
+contact does not count as held by its shape."""
+
 EXTREME_FORCES = 4
 """Extreme forces of a contact: both sides of its friction cone, at both ends of its width."""
 
@@ -122,7 +126,7 @@ ROUNDING = 1e-9
 def least_friction(scene, work):
     """Return µ, the smallest ratio |T|/N that the closed contacts can hold.
 
-    Between LEVER_TOLERANCE and its reciprocal; 0 without contacts or contact forces.
+    Between LEVER_TOLERANCE and UNLIMITED_FRICTION; 0 without contacts or contact forces.
     """
     least = 0.0
     if not has(scene, CONTACT_FORCE):
@@ -138,8 +142,8 @@ def least_friction(scene, work):
             friction = abs(tangential) / normal if normal > 0.0 else 0.0
             # A law with a tangential force but no Coulomb limit.
             if friction > 0.0 and not limit < math.inf:
-                friction = math.inf
-            friction = min(max(friction, LEVER_TOLERANCE), 1.0 / LEVER_TOLERANCE)
+                friction = UNLIMITED_FRICTION
+            friction = min(max(friction, LEVER_TOLERANCE), UNLIMITED_FRICTION)
             least = friction if least == 0.0 else min(least, friction)
     return least
 

@@ -63,7 +63,7 @@ def clear(arrays: Any) -> None:
 def sizes_in(arrays: Any) -> dict[str, int]:
     """Return the sizes {name: number} that a tuple was made with."""
     found: dict[str, int] = {}
-    for value, (element, shape) in zip(arrays, fields_of(type(arrays)).values(), strict=True):
+    for value, (element, shape) in zip(arrays, fields_of(arrays.__class__).values(), strict=True):
         if hasattr(element, "_fields"):
             found |= sizes_in(value)
         elif shape:

@@ -15,7 +15,6 @@ of the force cost steps.
 import math
 
 from flocsim.compiler.linker import loops_apart
-from flocsim.constants import TINY
 from flocsim.geometry.contact.attraction import arc_ends
 from flocsim.geometry.shapes.pieces import (
     at_parameter,
@@ -33,6 +32,9 @@ from flocsim.state.outlines import (
 SAME_POINT = 1e-3
 """Fraction of the gap below which two pieces count as equally near, or two feet as one; width of a
 panel, in t, below which its ends count as one."""
+
+LEAST_GROWTH = 1e-6
+"""A gap that grows by less than this fraction of itself counts as constant."""
 
 MOST_PANELS = 4
 """Panels on one side of a foot."""
@@ -94,14 +96,15 @@ def parameter_to_gap(scene, work, piece, foot, extent, target):
     if beyond <= target:
         return extent
     # Halve the range until its middle is near enough, then interpolate linearly in its outer half.
-    # The foot itself is near enough (find_feet).
-    while True:
+    # The foot itself is near enough (find_feet); where nothing is, as of NaN, the range ends at 0.
+    while extent > 0.0:
         x, y, _, _, _ = at_parameter(piece, foot + 0.5 * extent)
         gap = gap_from(scene, work, x, y)
         if gap <= target:
             return 0.5 * extent * (1.0 + (target - gap) / (beyond - gap))
         beyond = gap
         extent *= 0.5
+    return extent
 
 
 @loops_apart
@@ -176,7 +179,7 @@ def write_side(scene, work, count, piece, foot, growth, end, inset, lens, least)
     extent = min(2.0 * parted_gap / max(root, parted_gap / full_length), full_length)
     x, y, _, _, _ = at_parameter(piece, foot + math.copysign(extent / metres, reach))
     relative_growth = (gap_from(scene, work, x, y) - gap) / parted_gap
-    scale = extent / math.sqrt(max(relative_growth, TINY))
+    scale = extent / math.sqrt(max(relative_growth, LEAST_GROWTH))
     # Panels from kink to kink, the last one to the lens.
     last = graded_parameter(full_length / scale)
     scale, low = math.copysign(scale / metres, reach), 0.0
