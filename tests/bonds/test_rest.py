@@ -151,7 +151,7 @@ def by_linear_program(two, drift, grip):
 @pytest.mark.parametrize("friction", rest_slow(["none", 0.3, 0.0], lambda mu: mu == 0.3))
 def test_hooks_are_those_of_a_linear_program(friction):
     rng = np.random.default_rng(4)
-    grip = {"none": 1.0 / rest.LEVER_TOLERANCE, 0.0: rest.LEVER_TOLERANCE}.get(friction, friction)
+    grip = {"none": rest.UNLIMITED_FRICTION, 0.0: rest.LEVER_TOLERANCE}.get(friction, friction)
     found = []
     for case in range(25):
         _, _, two = entangled(rng, friction)
