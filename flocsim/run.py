@@ -282,7 +282,8 @@ def force_to_blame(system: Any, run: Run) -> str:
     # A state that is not finite says nothing about its cause.
     if not np.isfinite(start).all():
         return ""
-    work = copy_of(run.work)
+    # With more room: wider lists than the run had must not run out of it.
+    work = with_room(run.work)
     used = system.pieces.used
     pieces = [(name, force, laws_of([force], system.fluid)) for name, force in used.items()]
     classes = [type(force) for force in used.values()]

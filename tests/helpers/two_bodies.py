@@ -32,7 +32,7 @@ class TwoBodies:
         self.bodies = bodies
         self.scene = System(bodies, forces, fluid=WATER).scene(jit=False)
         motion = np.zeros((2, 3)) if motion is None else np.asarray(motion)
-        self.work = work_of(self.scene, np.asarray(places, dtype=float), motion)
+        self.work = work_of(self.scene, np.asarray(places, dtype=float), motion, 256)
         assert rebuild_list(self.scene, self.work)
         locate_contacts(self.scene, self.work, NOW)
         set_modes(self.scene, self.work)

@@ -38,7 +38,6 @@ import numpy as np
 
 from flocsim.compiler.composer import compiled
 from flocsim.compiler.linker import loops_apart
-from flocsim.constants import TINY
 from flocsim.geometry.shapes.pieces import (
     Pose,
     at_parameter,
@@ -47,6 +46,10 @@ from flocsim.geometry.shapes.pieces import (
     placed,
 )
 from flocsim.state.outlines import MOST_ORDER
+
+LEAST_ATTRACTION = 1e-9
+"""Attraction of a node [1/m³] that is not distinguished from none: that of plates 1 km apart. Laws
+take powers of the plate gap, which would overflow for less."""
 
 SERIES_LIMIT = 0.7
 """Largest w = sin²(φ/2) at which the series in w is used; arcs that extend further are integrated
@@ -259,8 +262,7 @@ def convert_to_plate_gaps(nodes, count, inset, lens):
         nodes.plate_gap[k] = shifted_gap * root if known else -1.0
     for k in range(count):
         if nodes.plate_gap[k] < 0.0:
-            # Without attraction plates are too far apart for any.
-            nodes.plate_gap[k] = max(nodes.attraction[k], TINY) ** (-1.0 / 3.0)
+            nodes.plate_gap[k] = max(nodes.attraction[k], LEAST_ATTRACTION) ** (-1.0 / 3.0)
 
 
 def finite_depth_factor(distance, depth):

@@ -22,9 +22,11 @@ from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import NEW, NOW
 
 KINK_FINENESS = 1e-4
-"""A kink is located to this fraction of its distance at the start of the step. An event function
-within this fraction of its value for the same overlap at rest counts as zero: its sign may be
-rounding, and steps would end there for ever."""
+"""A kink is located to this fraction of its distance at the start of the step."""
+
+KINK_ROUNDING = 1e-6
+"""An event function within this fraction of its value for the same overlap at rest counts as zero:
+its sign may be rounding, and steps would end there for ever."""
 
 
 def switch_resolutions(work, clock):
@@ -57,7 +59,7 @@ def kink_share(scene, work, row, which):
     # Too near to either end to be told from rounding.
     nearer, further = min(abs(before), abs(after)), max(abs(before), abs(after))
     at_rest = contact_event(scene, view_without_slip(view, view.overlap, 0.0), which)
-    negligible = KINK_FINENESS * max(further, abs(at_rest))
+    negligible = max(KINK_FINENESS * further, KINK_ROUNDING * abs(at_rest))
     if before * after >= 0.0 or nearer <= negligible:
         return math.inf
     # Aim past the kink, so that the next step begins behind it.

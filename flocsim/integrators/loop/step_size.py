@@ -14,7 +14,6 @@ import math
 from flocsim.constants import TINY
 from flocsim.geometry.contact.candidates import spendable_share, time_to_spend
 from flocsim.hooks import next_step
-from flocsim.integrators.events.samples import HALF_PERIOD
 from flocsim.integrators.exponential.collocation import may_be_series
 from flocsim.integrators.loop.kicks import kick_end
 from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
@@ -59,6 +58,11 @@ TOUCH_ERROR_FRACTION = 0.1
 """The error of the first step after a touch is taken as (h ω0)⁴ over this times the displacement
 that the impact leads to; that of a series as (h ω0)⁵ over this times the overlap v/ω0 of the
 impact, for the rotation of the contact normal, which the series does not contain."""
+
+MAX_PHASE = 4.0
+"""Phase ω h [rad], ω being the fastest vibration, up to which the switches inside a series are
+found reliably. A Radau step with a switch in it is repeated as a series of this length. With half a
+period, π, doublets that rattle need a third more steps."""
 
 LANDING_MARGIN = 0.05
 """A step across switches ends this many tolerances before a pair lands in it; the step that
@@ -174,12 +178,12 @@ def step_to_switch(scene, work, step, share):
     """Return the step [s] to try after one that passed a switch at a fraction of it.
 
     A Radau step damps vibrations, and the switch may be an artefact of that. Then a series is tried
-    instead, of half a period of the fastest vibration, but at most half of the step.
+    instead, as long as MAX_PHASE allows, but at most half of the step.
     """
     fastest = fastest_vibration(scene, work)
     if work.tally.kind != RADAU or not may_be_series(scene, work) or fastest == 0.0:
         return share * step
-    return max(share * step, min(0.5 * step, HALF_PERIOD / fastest))
+    return max(share * step, min(0.5 * step, MAX_PHASE / fastest))
 
 
 def plan(scene, work, clock, step, ratio, aimed_at_switch, switched):

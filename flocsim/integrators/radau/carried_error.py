@@ -112,6 +112,9 @@ MAX_SCATTER = 0.4
 """Largest scatter of an overlap, over the overlap itself, in a step in which a contact is unloaded.
 At a larger one the contact might hold although it should open."""
 
+ROUNDING_FACTOR = 30.0
+"""Overlaps below this multiple of the rounding of positions scatter by chance."""
+
 
 def overlap_scatter(scene, work, clock, step, row):
     """Return how far the overlap at the end of a step is off the line through the other stages [m].
@@ -140,7 +143,7 @@ def release_uncertainty(scene, work, clock, step):
     """
     largest, g = 0.0, work.geometry
     # Ignore scatter that is rounding.
-    least = at_least_rounding(work, NOW, 0.0)
+    least = ROUNDING_FACTOR * at_least_rounding(work, NOW, 0.0)
     for row in range(work.tally.candidates):
         if work.candidates[row].contact_mode == CLOSED:
             # Overlaps at both ends of the step.

@@ -4,6 +4,8 @@ It is the dense output inside the step, gives the state where a step ends early 
 extrapolates the first guess of the next step's stages.
 """
 
+import math
+
 from flocsim.constants import TINY
 from flocsim.integrators.radau.contact_frames import is_active
 from flocsim.integrators.radau.grazing import any_grazes
@@ -117,12 +119,16 @@ def guess_constant_accelerations(scene, work, step):
                 work.velocity[FIRST_STAGE + stage, body, axis] = speed
 
 
-def any_active(work):
-    """Return True if a contact or surface force acts."""
+def is_nonstiff(work, step):
+    """Return True if no contact or surface force acts, and drag hardly slows a body within a
+    step."""
     for row in range(work.tally.candidates):
         if is_active(work, row):
-            return True
-    return False
+            return False
+    shortest = math.inf
+    for body in range(work.poses.shape[0]):
+        shortest = min(shortest, work.errors[body].relaxation_time)
+    return NEGLIGIBLE * shortest >= step
 
 
 def extrapolate_cubic(work, begin, scale):
@@ -156,10 +162,10 @@ def guess_stages(scene, work, clock, step):
         extrapolate_cubic(work, (clock.time - clock.stages_time) / staged, step / staged)
     # Nothing is known: constant accelerations suit free motion, constant velocities a stiff
     # contact, whose acceleration soon ends.
-    elif any_active(work):
-        guess_constant_velocities(work)
-    else:
+    elif is_nonstiff(work, step):
         guess_constant_accelerations(scene, work, step)
+    else:
+        guess_constant_velocities(work)
     # From here on the stages belong to this step.
     copy_motion(work, NOW, START)
     clock.stages_step, clock.stages_time = step, clock.time

@@ -21,6 +21,10 @@ from flocsim.state.work import DAMPING, NEW, NOW, STEP_ERROR
 ROUNDING = 1e-15
 """Relative rounding of a coordinate or a time: a few units in the last place."""
 
+COARSEST_ROUNDING = 2e-15
+"""Limit of any resolution, as a fraction of the coordinates: ten neighbouring floating-point
+numbers. At half of it, doublets of very stiff bodies rattle for twice as many steps."""
+
 MAX_ITERATIONS = 10
 """Iterations for the end of a step before it is repeated with a smaller size, or otherwise."""
 
@@ -158,4 +162,4 @@ def largest_coordinate(work, state):
 
 def at_least_rounding(work, state, length):
     """Return a length [m], but not less than what coordinates can resolve."""
-    return max(length, ROUNDING * largest_coordinate(work, state))
+    return max(length, COARSEST_ROUNDING * largest_coordinate(work, state))

@@ -97,7 +97,7 @@ def parameter_to_gap(scene, work, piece, foot, extent, target):
         return extent
     # Halve the range until its middle is near enough, then interpolate linearly in its outer half.
     # The foot itself is near enough (find_feet); where nothing is, as of NaN, the range ends at 0.
-    while extent > 0.0:
+    while abs(extent) > 0.0:
         x, y, _, _, _ = at_parameter(piece, foot + 0.5 * extent)
         gap = gap_from(scene, work, x, y)
         if gap <= target:
