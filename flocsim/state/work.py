@@ -103,6 +103,8 @@ class Elimination(NamedTuple):
     column: Annotated[np.ndarray, ("room",), np.int64]  # column indices of the blocks
     blocks: Annotated[np.ndarray, (3, "sparse", 3, 4)]  # see elimination.REAL_PART
     where: Annotated[np.ndarray, ("n",), np.int64]  # block of the current row, by column
+    # Row swapped with each row of a diagonal block as it was factorised, in both systems.
+    pivots: Annotated[np.ndarray, (2, "n", 3), np.int64]
     joined: Annotated[np.ndarray, ("n", "n"), np.int8]  # 1: the bodies are neighbours
     degree: Annotated[np.ndarray, ("n",), np.int64]  # number of neighbours not eliminated
     cluster: Annotated[np.ndarray, ("n",), np.int64]  # clusters that the pattern is made for
