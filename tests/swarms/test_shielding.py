@@ -42,8 +42,8 @@ def shielding_of(swarm):
 
 
 def velocity(bodies, forces=FORCES, **options):
-    """The mean velocity at which bodies settle."""
-    return swarm_of(bodies, forces, **options).run("1 ms").velocity[-1, :, :2].mean(axis=0)
+    """The mean velocity at which bodies settle, in the end: at 1 ms it is 2e-5 short of that."""
+    return swarm_of(bodies, forces, **options).run("2 ms").velocity[-1, :, :2].mean(axis=0)
 
 
 @pytest.mark.slow
