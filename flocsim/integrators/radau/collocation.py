@@ -20,8 +20,8 @@ STIFF_STEP = 25.0
 squared. Beyond it, stiff forces balance at the stages only, and contacts would vibrate."""
 
 MAX_EXTRAPOLATION = 2.0
-"""Longest step, over the last one, for which the last cubic is extrapolated. At 8 a
-sixth of the steps is saved, but the momentum of a doublet is off by 6 to 20 times as much."""
+"""Longest step, over the last one, for which the last cubic is extrapolated. At 8, a sixth of the
+steps is saved, but the momentum of a doublet is off by 6 to 20 times as much."""
 
 
 def basis(fraction, node):

@@ -174,21 +174,22 @@ def add_row(e, slot, to, left, right, sign):
     return 0.0
 
 
-@loops_apart
 def divide_real(e, slot):
     """Divide the block of a slot by the factorised diagonal block above it, in the real system."""
     m, block, above = e.blocks, block_of(e, slot), e.column[slot]
     for i in range(3):
         # By U, column after column, then by L, which has ones on its diagonal.
         for j in range(3):
+            value = m[REAL_PART, block, i, j]
             for k in range(j):
-                m[REAL_PART, block, i, j] -= m[REAL_PART, block, i, k] * m[REAL_PART, above, k, j]
-            m[REAL_PART, block, i, j] *= m[REAL_PART, above, j, j]
+                value -= m[REAL_PART, block, i, k] * m[REAL_PART, above, k, j]
+            m[REAL_PART, block, i, j] = value * m[REAL_PART, above, j, j]
         for j in range(1, -1, -1):
+            value = m[REAL_PART, block, i, j]
             for k in range(j + 1, 3):
-                m[REAL_PART, block, i, j] -= m[REAL_PART, block, i, k] * m[REAL_PART, above, k, j]
+                value -= m[REAL_PART, block, i, k] * m[REAL_PART, above, k, j]
+            m[REAL_PART, block, i, j] = value
     swap_columns(e, REAL, block, above)
-    return 0.0
 
 
 def entry(blocks, block, i, j):
@@ -205,6 +206,7 @@ def divide_complex(e, slot):
     system."""
     m, block, above = e.blocks, block_of(e, slot), e.column[slot]
     for i in range(3):
+        # As in the real system.
         for j in range(3):
             value = entry(m, block, i, j)
             for k in range(j):
