@@ -259,12 +259,10 @@ MORE_STEPS = 5
 THIRD_OF = 16
 """One in so many second runs has a third one behind it."""
 
-Z = 1.959963984540054
-"""Normal quantile of 95 % intervals."""
-
-LEAST_SHARE, MOST_SHARE, FEW = 0.01, 0.035, 16
-"""Of the replicates "auto" has run again at least, and at most where that is more than FEW: less
-than a fifth of the cost of a study of 1,000 (benchmarks.accuracy.numerical_error)."""
+FEW, CHECKED_FRACTION = 16, 0.035
+"""How many replicates of a condition "auto" has run again at least, and the fraction of them where
+that is more: less than a fifth of the cost of a study of 1,000
+(benchmarks.accuracy.numerical_error)."""
 
 EASILY = 3
 """Times as many "auto" has run again of those that flip easily."""
@@ -278,16 +276,12 @@ def expected_checks(replicates: int, share: float | str, easily: bool = False) -
 
     ``easily``: if all of them were of those that flip easily, EASILY times as many by "auto".
 
-    "auto": where no outcome flips, Wilson's interval of the flip rate at m is as wide as that of a
-    probability of ½ at n replicates, z²/(m + z²) = z/√(n + z²), so m = z √(n + z²) − z²; beyond
-    FEW of them at most MOST_SHARE, and at least LEAST_SHARE. Never falls, nor rises by more than 1
-    from one replicate to the next.
+    "auto": all of the first FEW, and later CHECKED_FRACTION of them. Never falls, nor rises by more
+    than 1 from one replicate to the next.
     """
     if isinstance(share, str):
-        wanted = Z * math.sqrt(replicates + Z * Z) - Z * Z
-        wanted = min(wanted, max(FEW, MOST_SHARE * replicates))
-        wanted = max(wanted, LEAST_SHARE * replicates)
-        return min(EASILY * wanted, replicates) if easily else wanted
+        wanted = max(FEW, CHECKED_FRACTION * replicates)
+        return min(EASILY * wanted if easily else wanted, replicates)
     return share * replicates
 
 

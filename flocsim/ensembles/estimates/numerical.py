@@ -15,7 +15,6 @@ first part less what may be lost to the first part and what may be gained.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -183,36 +182,39 @@ def change_intervals(
 
 
 def further_of_kinds(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray) -> np.ndarray:
-    """Return further_flips (kind, 3, …) of each kind: of arrays (kind, type, vertices, …), whose
-    rates are compared among the conditions of one N.
+    """Return further_flips (kind, 3, …) of each kind: of arrays (kind, condition, …).
 
-    Of a kind of which none was run again at this N all may flip; NaN where no replicate was.
+    Of a kind of which none was run again anywhere all may flip; NaN where no replicate of any kind
+    was.
     """
-    found = np.zeros((len(flipped), 3, *flipped.shape[1:]))
-    for n in range(checked.shape[2]) if checked.ndim > 2 else [...]:
-        at: Any = (slice(None), n) if n is not ... else ...
-        for part, *of_kind in zip(found, flipped, checked, exposed, strict=True):
-            f, c, u = (each[at] for each in of_kind)
-            more = further_flips(f, c, u)
-            # All replicates of a kind without second runs may flip; without any, nothing is known.
-            if np.any(checked[:, *np.index_exp[at]]):
-                more = np.where(np.isnan(more[0]), [np.ceil(u), u, np.zeros(u.shape)], more)
-            part[:, *np.index_exp[at]] = more
+    found = np.stack(
+        [further_flips(*of_kind) for of_kind in zip(flipped, checked, exposed, strict=True)]
+    )
+    if np.any(checked):
+        worst = np.stack([exposed, exposed, np.zeros_like(exposed)], axis=1)
+        found = np.where(np.isnan(found), worst, found)
     return found
 
 
 def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray) -> np.ndarray:
-    """Return further_flips (3, …) of third runs, which are few: rates are compared among all
-    conditions, and with SEEN_BEFORE."""
-    f, c, u = map(np.append, (flipped, checked, exposed), SEEN_BEFORE)
-    return further_flips(f, c, u)[:, : flipped.size].reshape(3, *flipped.shape)
+    """Return (most, mean, none) (3, …) of flips between second and third runs, as further_flips.
+
+    Third runs are too few to tell conditions apart: those of the whole study share one rate, of
+    which LATE_RATES is known beforehand. Where any may flip, ``most`` is one at least.
+    """
+    flips, runs = np.sum(flipped), np.sum(checked)
+    weights = weights_of(*LATE_RATES, flips, runs)
+    found = predicted(*LATE_RATES[:2], weights, np.broadcast_arrays(flips, runs, exposed))
+    found[0] = np.maximum(found[0], exposed > 0.0)
+    return found
 
 
-SEEN_BEFORE = [0, 1], [250, 250], [0, 0]
-"""How many third runs ended otherwise than second ones, of how many, where that was looked at
-(benchmarks.accuracy.numerical_error), as in two conditions, of which none is left: without them a
-study of one condition, of which a few replicates are run a third time, would know next to nothing
-of this."""
+LATE_RATES = np.array([1.5, 0.5]), np.array([0.003, 0.5]), np.log([0.9, 0.1])
+"""Shapes and means of two gamma distributions of the rate at which third runs flip, and the
+logarithms of their weights: Jeffreys's shape of ½ behind one flip in 500 runs, which is what third
+runs of studies flip (benchmarks.accuracy.numerical_error); and behind none in a single one, in case
+that this study is not like those. Source of such mixtures: Schmidli et al., Biometrics 70 (2014)
+1023, section 3. The few third runs of a small study would say next to nothing by themselves."""
 
 
 SHAPES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
@@ -226,19 +228,14 @@ def further_flips(
     """Return (most, mean, none) (3, …): how many more flip at most, with the probability that is
     asked for, and on average, and the probability that none does.
 
-    Arrays of one shape, a place for each condition: f ``flipped`` of c ``checked``, and how many
+    Arrays of one shape, an element for each condition: f ``flipped`` of c ``checked``, and how many
     others, u, may flip (``exposed``, need not be whole). NaN where nothing was checked anywhere.
 
     Rates of flips scatter over conditions by a gamma distribution of shape k and mean m, of which
     k in SHAPES and m in MEANS (before anything is seen as the square root of m, per log m) are
-    weighed by what all conditions show: f is negative binomial. Given f of c, the rate here has
-    shape k + f and rate k/m + c, and the number of further flips is at most q with probability
-    I_p(k + f, q + 1), I the incomplete beta function, p = b/(b + u), b = k/m + c; their mean over
-    k and m has its quantile here. So where flips sit in few conditions a condition in which few
-    were run again is in doubt, and where all are alike it borrows from the others.
+    weighed by the flips of all conditions. So where flips sit in few conditions a condition in
+    which few were run again is in doubt, and where all are alike it borrows from the others.
     """
-    from scipy.special import betainc, gammaln
-
     f, c, u = np.broadcast_arrays(
         *(np.asarray(each, float) for each in (flipped, checked, exposed))
     )
@@ -248,36 +245,64 @@ def further_flips(
     # Conditions of the same f of c weigh the distributions alike: computed once, counted often.
     seen, times = np.unique(np.stack([f.ravel(), c.ravel()]), axis=1, return_counts=True)
     k, m = (each.ravel() for each in np.meshgrid(SHAPES, MEANS))
+    weights = weights_of(k, m, 0.5 * np.log(m), *seen, times)
+    some = weights > NEGLIGIBLE
+    return predicted(k[some], m[some], weights[some] / weights[some].sum(), (f, c, u), confidence)
+
+
+def weights_of(
+    k: np.ndarray, m: np.ndarray, log_prior: np.ndarray,
+    flipped: np.ndarray, checked: np.ndarray, times: ArrayLike = 1,
+) -> np.ndarray:  # fmt: skip
+    """Return the posterior weights of gamma distributions of shapes k and means m of a rate.
+
+    ``flipped`` of ``checked`` runs were seen in conditions, each so many ``times``.
+    """
+    from scipy.special import gammaln
+
+    f, c = np.atleast_1d(flipped), np.atleast_1d(checked)
     rate = (k / m)[:, np.newaxis]
-    f_seen, c_seen = seen
     # log of the negative binomial's Γ(k + f)/Γ(k) (r/(r + c))^k (r + c)^−f, r = k/m: factors of f
-    # and c alone are the same for all (k, m). Summed over conditions, and ½ log m for the prior.
+    # and c alone are the same for all (k, m).
     logs = (
-        gammaln(k[:, np.newaxis] + f_seen) - gammaln(k)[:, np.newaxis]
-        + k[:, np.newaxis] * np.log(rate / (rate + c_seen)) - f_seen * np.log(rate + c_seen)
+        gammaln(k[:, np.newaxis] + f) - gammaln(k)[:, np.newaxis]
+        + k[:, np.newaxis] * np.log(rate / (rate + c)) - f * np.log(rate + c)
     )  # fmt: skip
-    logs = logs @ times + 0.5 * np.log(m)
+    logs = np.sum(logs * times, axis=1) + log_prior
     # The largest weight is set to 1 before exponentials are taken: none of them overflows.
     weights = np.exp(logs - logs.max())
-    weights /= weights.sum()
-    some = weights > NEGLIGIBLE
-    k, rate, weights = k[some], rate[some], weights[some] / weights[some].sum()
+    return weights / weights.sum()
+
+
+def predicted(
+    k: np.ndarray, m: np.ndarray, weights: np.ndarray, seen: Sequence[np.ndarray],
+    confidence: float = EACH_SIDE,
+) -> np.ndarray:  # fmt: skip
+    """Return (most, mean, none) (3, …), see further_flips, by weighted gamma distributions.
+
+    ``seen``: f flipped of c checked, and u exposed. Given f of c, a rate has shape k + f and rate
+    k/m + c, and the number of further flips is at most q with probability I_p(k + f, q + 1), I the
+    incomplete beta function, p = b/(b + u), b = k/m + c. The mean over the distributions has its
+    quantile here.
+    """
+    from scipy.special import betainc
+
     # Conditions of the same numbers have the same bound: found once.
-    cases, places = np.unique(np.stack([f.ravel(), c.ravel(), u.ravel()]), axis=1,
-                              return_inverse=True)  # fmt: skip
-    f_here, c_here, u_here = cases
-    shape, b = k[:, np.newaxis] + f_here, rate + c_here
-    low, high = np.full(f_here.shape, -1.0), np.ceil(u_here)
+    shape_of_result = seen[0].shape
+    cases, index = np.unique(np.stack([each.ravel() for each in seen]), axis=1, return_inverse=True)
+    f, c, u = cases.astype(float)
+    shape, b = k[:, np.newaxis] + f, (k / m)[:, np.newaxis] + c
+    low, high = np.full(f.shape, -1.0), np.ceil(u)
     # The smallest q lies above low, and is no more than high: halve until they are neighbours.
     while np.any(high - low > 1.0):
         middle = np.floor(0.5 * (low + high))
-        enough = weights @ betainc(shape, middle + 1.0, b / (b + u_here)) >= confidence
+        enough = weights @ betainc(shape, middle + 1.0, b / (b + u)) >= confidence
         split = high - low > 1.0
         low = np.where(split & ~enough, middle, low)
         high = np.where(split & enough, middle, high)
-    mean = np.minimum(weights @ (shape * u_here / b), u_here)
-    none = weights @ (b / (b + u_here)) ** shape
-    return np.stack([high, mean, none])[:, places.reshape(f.shape)]
+    mean = np.minimum(weights @ (shape * u / b), u)
+    none = weights @ (b / (b + u)) ** shape
+    return np.stack([high, mean, none])[:, index.reshape(shape_of_result)]
 
 
 def flips_together(parts: ArrayLike, confidence: float = EACH_SIDE) -> np.ndarray:

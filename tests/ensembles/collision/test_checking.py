@@ -20,7 +20,6 @@ from flocsim.ensembles.diagnose.dry_run import checked_words
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from flocsim.integrators.parts import FixedStep
-from flocsim.io.confidence import score_interval
 from flocsim.io.results.schema import NOT_APPLICABLE
 from tests.helpers.small_study import small_config, small_study
 
@@ -43,17 +42,12 @@ def test_of_the_first_so_many_just_as_many_are_checked_as_are_said_to_be(seed, s
     assert third == math.ceil(chosen[-1] / THIRD_OF) and (share == 0.0 or max(runs[:40]) == 2)
 
 
-@pytest.mark.parametrize("count", [3, 20, 60, 200, 1000, 30_000, 10**6, 10**9])
-def test_auto_makes_the_interval_of_flips_as_narrow_as_the_sampling_one_within_its_cost(count):
-    wanted = expected_checks(count, "auto")
-    flips = np.diff(score_interval(np.array(0.0), np.array(wanted)), axis=0)[0]
-    sampling = np.diff(score_interval(np.array(0.5), np.array(float(count))), axis=0)[0]
-    assert 0.01 * count <= wanted <= max(16.0, 0.035 * count)
-    if wanted in (16.0, 0.035 * count):
-        assert flips > sampling
-    else:
-        assert flips <= sampling * (1.0 + 1e-9)
-        assert wanted == 0.01 * count or flips == pytest.approx(sampling)
+def test_auto_checks_the_first_sixteen_and_later_a_fixed_fraction():
+    wanted = {n: expected_checks(n, "auto") for n in (1, 3, 16, 60, 1000, 10**6)}
+    assert wanted == {1: 1, 3: 3, 16: 16, 60: 16, 1000: 35, 10**6: 35_000}
+    easily = {n: expected_checks(n, "auto", easily=True) for n in (10, 48, 60, 1000)}
+    assert easily == {10: 10, 48: 48, 60: 48, 1000: 105}
+    assert max(np.diff([expected_checks(n, "auto", easily=True) for n in range(3000)])) <= 1.0
 
 
 def test_methods_are_made_more_exact_and_no_other():
