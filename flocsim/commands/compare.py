@@ -12,6 +12,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     first: results file written by flocsim ensemble
     second: results file to compare with it
+    --numerics: add by how much exact runs would change each difference
     """
     known = [
         f"of {kind.title} {', '.join(f'{name} ({words})' for name, words in kind.compared.items())}"
@@ -22,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("first")
     parser.add_argument("second")
     parser.add_argument("--quantity", metavar="NAME", help=words.replace("%", "%%"))
+    parser.add_argument("--numerics", action="store_true")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -31,5 +33,5 @@ def run(args: argparse.Namespace) -> int:
         kind, file = open_kind(path, "compare")
         both.append(kind.opened(file))
         print(f"{path}: {kind.source(both[-1]) or 'its source is not stated'}")
-    print(compare(*both).table(*filter(None, [args.quantity])))
+    print(compare(*both).table(args.quantity, args.numerics))
     return 0

@@ -6,7 +6,7 @@ from typing import Any
 
 from flocsim.commands import add_allowed, allowed_by
 from flocsim.ensembles.config.sources import read_sources
-from flocsim.ensembles.contents import info_of, open_kind, unfinished_text
+from flocsim.ensembles.contents import info_of, open_kind, text_of, unfinished_text
 from flocsim.errors import FileError
 from flocsim.io.journal import journal_of
 
@@ -17,6 +17,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     without touching it.
 
     results: file written, or being written, by flocsim
+    --numerics: add the numerical error of each probability to the table
+    --all: add all columns to the table
     --config: print only the config that it was run with
     --modules: print only the user's modules that it was run with
     --water: print only how often the equivalent spheres of a study of pairs or rates touch, with
@@ -24,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         shape library, how fast its flocs settle and turn
     """
     parser.add_argument("results")
-    for name in ("--config", "--modules", "--water"):
+    for name in ("--numerics", "--all", "--config", "--modules", "--water"):
         parser.add_argument(name, action="store_true")
     add_allowed(parser)
 
@@ -45,6 +47,11 @@ def run(args: argparse.Namespace) -> int:
     elif args.config or args.modules:
         kind, file = open_kind(args.results)
         print_inputs(args, getattr(kind.read(file), "run", {}))
+    elif args.numerics or args.all:
+        kind, file = open_kind(args.results, "detailed")
+        found = kind.read(file)
+        table = kind.detailed(found, args.numerics, args.all)
+        print(text_of(args.results, kind, found, table))
     else:
         print(info_of(args.results))
     return 0

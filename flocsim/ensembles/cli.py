@@ -42,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     --dry-run: show what would be run, and what is doubtful, and stop: nothing is compiled or run
     --pilot: with --dry-run: run some replicates for some seconds, to estimate the core-hours of the
         study and the size of its file
+    --verbose: with --dry-run: show what the engine makes of collisions, forces and time scales
     --quiet: print warnings and errors only
     """
     add = parser.add_argument
@@ -57,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--overwrite", action="store_true")
     add("--dry-run", action="store_true")
     add("--pilot", action="store_true")
+    add("--verbose", action="store_true")
     add("--quiet", action="store_true")
     # What Study.run says to its own process: with whom it is to end.
     add("--parent", type=int, help=argparse.SUPPRESS)
@@ -82,8 +84,9 @@ def check_start(options: argparse.Namespace, config: Any, comm: Communicator) ->
 
     if options.jobs < 1:
         raise UsageError(f"--jobs must be at least 1, found {options.jobs}")
-    if options.pilot and not options.dry_run:
-        raise UsageError("--pilot is for --dry-run: leave it out")
+    for name in ("pilot", "verbose"):
+        if getattr(options, name) and not options.dry_run:
+            raise UsageError(f"--{name} is for --dry-run: leave it out")
     if options.jobs > 1 and comm.is_launched and not options.dry_run:
         raise UsageError("--jobs is for runs without an MPI launcher: leave out one or the other")
     if options.command == "kernel" and not config.is_kernel:
@@ -139,7 +142,7 @@ def study(config: Any, comm: Communicator, options: argparse.Namespace) -> int:
     shown = contents_of(kind_of(config).format)
     found, seconds = ended.results, ended.wall_time
     if not options.quiet:
-        print(shown.told(found))
+        print(shown.table(found))
         print(shown.source(found))
         print(f"{output}: {ended.total} replicates, {ended.computed} of them run in "
              f"{seconds:.1f} s, {ended.computed / seconds:.0f}/s")  # fmt: skip
@@ -165,7 +168,8 @@ def dry_run(config: Any, comm: Communicator, options: argparse.Namespace) -> int
 
     if comm.rank == 0:
         shown = contents_of(kind_of(config).format)
-        text = shown.dry_run(config, max(comm.size, options.jobs), options.pilot)
+        ranks = max(comm.size, options.jobs)
+        text = shown.dry_run(config, ranks, options.pilot, options.verbose)
         if stop_requested():
             raise StopRequested(f"stopped by {INTERRUPTION.name}")
         print(text)

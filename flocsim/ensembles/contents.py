@@ -88,6 +88,8 @@ class Contents:
     """Groups of results that sweeps join, the first being printed; none: they cannot be run."""
     swept_table: Any = None
     """(that group, Labelled) → (heads, row) of `table_along` at the values of the swept keys."""
+    detailed: Any = None
+    """(found, whether to add numerical errors, whether all columns) → its numbers as text."""
     compare: Any = None
     """(opened, opened) → Tables of differences, whose ``table(name)`` is text."""
     animate: Any = None
@@ -149,10 +151,6 @@ class Contents:
         """Return what the results say of a study besides their tables, as JSON can hold it."""
         return {}
 
-    def told(self, found: Any) -> str:
-        """Return what is printed where a study has been run."""
-        return self.table(found)
-
     def verdict(self, found: Any) -> tuple[int, str]:
         """Return (exit code, what to say of replicates without an outcome; "" for nothing)."""
         return 0, ""
@@ -161,7 +159,7 @@ class Contents:
         """Return a function: are so many replicates of each condition enough?"""
         return lambda n: False
 
-    def dry_run(self, config: Any, ranks: int, pilot: bool) -> str:
+    def dry_run(self, config: Any, ranks: int, pilot: bool, verbose: bool) -> str:
         """Return what a study would do."""
         from flocsim.ensembles.kind import study_of  # which needs the engine
 
@@ -192,14 +190,14 @@ def studies() -> list[Contents]:
     return [contents_of(name) for name in STUDIES]
 
 
-def text_of(path: object, kind: Contents, found: Any) -> str:
-    """Return what `flocsim info` prints of a file, and its page shows."""
+def text_of(path: object, kind: Contents, found: Any, table: str | None = None) -> str:
+    """Return what `flocsim info` prints of a file; ``table``: instead of its usual one."""
     try:
         said, mark = kind.summary(found), kind.mark(found)
     except UNREADABLE as error:
         raise FileError(f"{path} has no readable {kind.title}: {error}") from error
     head = f"{path}: {kind.title}; {mark}" if mark else f"{path}: {kind.title}"
-    return page_of(head, kind.source(found), said, kind.table(found))
+    return page_of(head, kind.source(found), said, table or kind.table(found))
 
 
 def page_of(head: str, source: str, said: Summary, table: str) -> str:
@@ -326,38 +324,70 @@ class Differences(Tables):
         }  # fmt: skip
         return Labelled(self.axes, columns, {self.word: text, "paired": int(self.paired)})
 
-    def table(self, quantity: str | None = None) -> str:
-        """Return the differences of one quantity, the first where none is named, as text; a star
-        marks intervals, numerics included, without 0."""
+    def table(self, quantity: str | None = None, numerics: bool = False) -> str:
+        """Return the differences of one quantity, the first where none is named, as text.
+
+        A star marks intervals, numerics included, without 0. ``numerics``: add by how much exact
+        runs would change each difference; also done where that exceeds half of an interval.
+        """
         quantity = self.known(quantity)
         unit, text = self.quantities[quantity]
         arrays = self.arrays[quantity]
-        numerics = "change_low" in arrays
+        width = arrays["difference_high"] - arrays["difference_low"]
+        known = "change_low" in arrays
+        error = np.maximum(-arrays["change_low"], arrays["change_high"]) if known else np.zeros(1)
+        shown = known and (numerics or bool(np.any(error > 0.5 * width)))
 
         def row(place: tuple[int, ...]) -> Sequence[str]:
             at = {name: float(values[place]) for name, values in arrays.items()}
             values = (f"{at[name]:{self.digits}}" for name in ("first", "second"))
-            return f"{at['n_first']:.0f}/{at['n_second']:.0f}", *values, self.interval(at)
+            added = [f"{at['change_low']:+.3f} {at['change_high']:+.3f}"] if shown else []
+            n = f"{at['n_first']:.0f}/{at['n_second']:.0f}"
+            return n, *values, self.interval(at), *added, self.star(at)
 
         axes = {with_unit(k, each.about["units"]): each.values for k, each in self.axes.items()}
-        heads = "n", "first", "second", "difference [95 %]" + " numerics" * numerics
+        heads = "n", "first", "second", "difference [low, high]", *["numerics"] * shown, ""
         both = f"the {self.pairs} {self.noun} that both have, paired"
         how = both if self.paired else "independent samples"
         title = f"{with_unit(text, unit)}, second minus first: {how}"
-        return "\n".join([*self.changes, title, "", table_along(axes, heads, row)])
+        lines = [*self.changes, title, "", table_along(axes, heads, row)]
+        lines.append(
+            "[low, high]: 95 % interval of sampling; *: without 0, numerical error included"
+        )
+        if known and np.isfinite(error).any():
+            most = f"at most ±{np.nanmax(error):.3f} in any condition (95 %)"
+            lines.append(f"Numerical error: exact runs would change a difference by {most}.")
+        return "\n".join(lines)
 
     def interval(self, at: Mapping[str, float]) -> str:
-        """Return "+0.030 [+0.010, +0.050] -0.004 +0.010 *": a difference, what numerics may change
-        of it, and a star where 0 is outside both together."""
+        """Return "+0.030 [+0.010, +0.050]" of the MEANINGS of a difference, or "–"."""
         if np.isnan(at["difference"]):
-            return "-"
+            return "–"
         form = f"+{self.digits}"
         low, high = at["difference_low"], at["difference_high"]
-        added = [float(np.nan_to_num(at.get(name, 0.0))) for name in ("change_low", "change_high")]
-        star = " *" if low + added[0] > 0.0 or high + added[1] < 0.0 else ""
-        numerics = "".join(f" {at[name]:{form}}" for name in ("change_low", "change_high")
-                           if name in at)  # fmt: skip
-        return f"{at['difference']:{form}} [{low:{form}}, {high:{form}}]{numerics}{star}"
+        return f"{at['difference']:{form}} [{low:{form}}, {high:{form}}]"
+
+    def star(self, at: Mapping[str, float]) -> str:
+        """Return "*" where 0 is outside the interval and what numerics may add to it, else ""."""
+        low, high = (
+            at[f"difference{end}"] + float(np.nan_to_num(at.get(f"change{end}", 0.0)))
+            for end in ("_low", "_high")
+        )
+        return "*" if low > 0.0 or high < 0.0 else ""
+
+    def without_spread(self) -> "Differences":
+        """Return the differences with all intervals of 0, as of a study and itself."""
+        exact = ("difference_low", "difference_high", "change_low", "change_high")
+        arrays = {
+            quantity: {
+                name: each["difference"] if name in exact else values
+                for name, values in each.items()
+            }
+            for quantity, each in self.arrays.items()
+        }
+        return attrs.evolve(
+            self, arrays=arrays, changes=("Both files hold the same replicates of one study.",)
+        )
 
 
 def stored_in(results: Any, name: str = "identity") -> dict[str, Any]:
@@ -404,7 +434,9 @@ def compare(first: Any, second: Any) -> Differences:
     name, other = (getattr(each, "format", "") for each in (first, second))
     if name == other and name in STUDIES and contents_of(name).compare is not None:
         found: Differences = contents_of(name).compare(first, second)
-        return found
+        differences = [each["difference"] for each in found.arrays.values()]
+        same = found.paired and not found.changes and not np.any(np.nan_to_num(differences))
+        return found.without_spread() if same else found
     words = " and ".join(type(each).__name__ for each in (first, second))
     able = ", or ".join(f"two {each.title}" for each in studies() if each.compare)
     raise UsageError(f"{able} can be compared: found {words}")

@@ -1,7 +1,8 @@
 """The table of a study for the terminal."""
 
 import itertools
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -14,73 +15,97 @@ from flocsim.io.results.schema import CLASSES, Results
 from flocsim.io.terminal import aligned
 from flocsim.process import WITHHELD
 
-WIDTH = 110
-"""Columns of a wide terminal; the table is set more openly where this leaves room."""
+OTHER = ("missed", "held", "undecided", "failed")
+"""Outcomes that stand together in the column "other"."""
 
-EFFICIENCY = "aggregations per approach over delta, in the plane and axially [95 %]"
-"""What the efficiencies are."""
+FURTHER = ("collided", "inside", *OTHER)
+"""Counts that have columns of their own only where all are asked for."""
+
+LEGEND = (
+    "Pr: of pairs that touched, with 95 % sampling interval; –: none did. A: stick after contact "
+    "inside",
+    "the zone, B: part; C, D: the same outside. other: did not touch, or came to no outcome.",
+)
+"""Lines below a table of probabilities."""
 
 
-def format_table(results: Results) -> str:
-    """Return counts and probabilities with their errors, one row per condition, a block per type.
+def format_table(results: Results, numerics: bool, every: bool = False) -> str:
+    """Return counts and probabilities with 95 % intervals, one row per condition, a block per type.
 
-    Pr +- sampling error (longer side of the 95 % interval) +- numerical error (95 % bound); of a
-    study whose outlines were cut closer and wider as well, between what Pr[A] would change by that
-    (95 %).
+    Parameters
+    ----------
+    results : Results
+    numerics : bool
+        Add the change of each probability if all replicates were run exactly (95 %).
+    every : bool
+        Add the fraction of A and C that hang by their shapes (the others stick), and all counts.
 
-    Plain ASCII apart from the names; up to 110 columns for counts below 1e5; "-" where there was no
-    event to estimate a probability from. A line below says of delta = 1 that it grazes. Of the
-    aggregations some hang by their shapes, as statics shows, and the others stick. Returns text
-    without a final line end.
+    Returns
+    -------
+    str
+        Lines of up to 100 characters, unless columns are added; without a final line end.
     """
+    columns = columns_of(results, numerics, every)
     conditions = list(np.ndindex(results.shape))
-    columns = columns_of(results)
-    cells = [[column(place) for column in columns.values()] for place in conditions]
-    rows = [*zip(*(head.split("/") for head in columns), strict=True), *cells]
-    lines = aligned(rows)
-    if len(max(lines, key=len)) > WIDTH:
-        lines = aligned(rows, gap=" ")
-    found = lines[:2]
-    for (t, *first), line in zip(conditions, lines[2:], strict=True):
-        found += [line] if any(first) else [f"type {results.types[t]}", line]
-    return "\n".join([*found, *graze_lines(results.delta)])
+    lines = aligned([[*columns], *([cell(at) for cell in columns.values()] for at in conditions)])
+    found = lines[:1]
+    for (t, *first), line in zip(conditions, lines[1:], strict=True):
+        found += [line] if any(first) else [f"type {type_in_words(results, t)}", line]
+    return "\n".join([*found, *LEGEND, *graze_lines(results.delta)])
 
 
-def columns_of(results: Results) -> dict[str, Callable[[tuple[int, ...]], str]]:
-    """Return {head of a column, in two lines: (place of a condition) → its cell}."""
-    table, outlines = results.probabilities, results.outlines
+def type_in_words(results: Results, t: int) -> str:
+    """Return "I: r_i = 16.41 µm, r_j = 23.02 µm", or the name alone where radii are not fixed."""
+    radii = {name: 1e6 * float(values[t]) for name, values in results.radii.items()}
+    known = ", ".join(f"{name} = {radius:.4g} µm" for name, radius in radii.items() if radius > 0.0)
+    return f"{results.types[t]}: {known}" if known else results.types[t]
 
-    def count(name: str, *place_of_class: int) -> Callable[[tuple[int, ...]], str]:
-        return lambda place: str(table[name][(*place, *place_of_class)])
 
-    def hanging(place: tuple[int, ...]) -> str:
-        value = table["pr_bond"][(*place, HOOK - 1)]
-        return "-" if np.isnan(value) else share(value)
-
-    found = {
-        "/N": lambda place: str(results.vertices[place[1]]),
-        "del-/ta": lambda place: f"{results.delta[place[2]]:g}",
-        "/n": count("n_total"),
-        "col-/lided": count("n_collided"),
-        "in-/side": count("n_inside"),
-        "Pr[inside]/95 %  num.": lambda place: with_errors(table, "pr_inside", place),
-        "Pr[A]/95 %  num.": lambda place: with_errors(table, "pr_a", place),
+def columns_of(
+    results: Results, numerics: bool, every: bool
+) -> dict[str, Callable[[tuple[int, ...]], str]]:
+    """Return {head of a column: (index of a condition) → its cell}."""
+    table, changes, outlines = results.probabilities, results.numerics, results.outlines
+    found: dict[str, Callable[[tuple[int, ...]], str]] = {
+        "N": lambda at: str(results.vertices[at[1]]),
+        "δ": lambda at: f"{results.delta[at[2]]:g}",
+        "n": lambda at: str(table["n_total"][at]),
     }
+
+    def interval(name: str) -> Callable[[tuple[int, ...]], str]:
+        ends = [table[name + end] for end in ("", "_low", "_high")]
+        return lambda at: with_interval(*(each[at] for each in ends))
+
+    def change(group: Mapping[str, np.ndarray], name: str) -> Callable[[tuple[int, ...]], str]:
+        return lambda at: between(group[f"{name}_low"][at], group[f"{name}_high"][at])
+
+    def count(name: str, *of_class: int) -> Callable[[tuple[int, ...]], str]:
+        return lambda at: str(table[f"n_{name}"][(*at, *of_class)])
+
+    for name, head in (("pr_inside", "Pr[inside]"), ("pr_a", "Pr[A]")):
+        found[f"{head} [low, high]"] = interval(name)
+        if numerics and changes:
+            found[f"numerics {head}"] = change(changes, f"{name}_change")
     if outlines:
-        found["of Pr[A]/shape"] = lambda place: shape_error(outlines, place)
-    found["of A/hang"] = hanging
-    found |= {f"/{name}": count("n_class", place) for place, name in enumerate(CLASSES)}
-    found["mis-/sed"] = count("n_missed")
-    if np.any(table["n_held"]):  # it takes colloids that repel each other
-        found["/held"] = count("n_held")
-    return found | {"unde-/cided": count("n_undecided"), "fail-/ed": count("n_failed")}
+        found["outlines Pr[A]"] = change(outlines, "pr_a_shape")
+    found |= {name: count("class", k) for k, name in enumerate(CLASSES)}
+    if not every:
+        return found | {"other": lambda at: others(table, at)}
+    found["hang"] = lambda at: number(table["pr_bond"][(*at, HOOK - 1)])
+    return found | {name: count(name) for name in FURTHER}
 
 
-GRAZE = "delta 1: by construction the outlines just graze, or miss; it says little about collisions"
+def others(table: Mapping[str, np.ndarray], at: tuple[int, ...]) -> str:
+    """Return "3 missed, 2 held"; 0 for none."""
+    counts = {name: int(table[f"n_{name}"][at]) for name in OTHER}
+    return ", ".join(f"{count} {name}" for name, count in counts.items() if count) or "0"
+
+
+GRAZE = "δ = 1: outlines just graze, or miss, by construction; it says little about collisions."
 
 
 def graze_lines(delta: Sequence[float] | np.ndarray) -> list[str]:
-    """What to say of a displacement by all of delta_max, where there is one."""
+    """Return what to say of a displacement by all of delta_max, where there is one."""
     return [GRAZE] if 1.0 in np.asarray(delta) else []
 
 
@@ -98,7 +123,8 @@ def efficiency_lines(results: Results) -> list[str]:
                 f"{e[t, v]:.3f} [{lo[t, v]:.3f}, {hi[t, v]:.3f}]" for e, lo, hi in (planar, axial)
             )
             lines.append(f"type {results.types[t]}, N = {results.vertices[v]}: {first}   {second}")
-    return [f"efficiency: {EFFICIENCY}", *lines] if lines else []
+    head = "Aggregations per approach over δ, in the plane and axially [95 %]:"
+    return [head, *lines] if lines else []
 
 
 RECTILINEAR = (
@@ -111,62 +137,80 @@ IN_WATER = "for the effect of the water on equivalent spheres: flocsim info FILE
 """Where that is to be had."""
 
 KERNEL_HEADER = (
-    ("class", "", "width [um]", "", "alpha", "beta2", "beta3 [m3/s]", "over ref."),
-    ("i", "j", "touched", "aggregated", "95 %    num.", "[m2/s]", "+- 95 %", "sphere"),
+    "i", "j", "W_c [µm]", "W_a [µm]", "α [low, high]", "β₂ [m²/s]", "β₃ [m³/s] [low, high]", "E₃",
+)  # fmt: skip
+KERNEL_LEGEND = (
+    "i, j: size classes; W_c, W_a: capture widths of pairs that touch, that aggregate; α: those "
+    "that",
+    "aggregate of those that touch; β₂, β₃: kernels in the plane, in space; E₃: β₃ over that of "
+    "spheres",
+    "that aggregate wherever straight paths touch; [low, high]: 95 % sampling interval.",
 )
+"""Columns of rates, and lines below their tables."""
 
 
-def kernel_lines(kernel: Kernel) -> list[str]:
-    """Return the rates of a kernel study as tables of text: one for each mechanism and N."""
+def kernel_lines(kernel: Kernel, numerics: bool) -> list[str]:
+    """Return the rates of a kernel study as tables of text: one for each mechanism and N.
+
+    ``numerics``: add the change of α if all encounters were run exactly.
+    """
     lines = [f"capture widths and kernels, {RECTILINEAR}", IN_WATER]
     if kernel.water:
         lines = ["capture widths and kernels, with hydrodynamic interaction"]
     pairs = list(itertools.combinations_with_replacement(range(len(kernel.labels)), 2))
+    head = [*KERNEL_HEADER, *["numerics α"] * numerics]
     for m, mechanism in enumerate(kernel.mechanisms):
         for v, count in enumerate(kernel.vertices):
             met = (kernel.arrays["checked"][m, v] >= 0.0) & (kernel.arrays["width_c"][m, v] != 0.0)
-            rows = [kernel_row(kernel, (m, v, i, j)) for i, j in pairs if met[i, j]]
-            table = aligned([*KERNEL_HEADER, *rows], gap=" ")
-            lines += ["", f"{mechanism}, N = {count}", *table]
+            rows = [kernel_row(kernel, (m, v, i, j), numerics) for i, j in pairs if met[i, j]]
+            lines += ["", f"{mechanism}, N = {count}", *aligned([head, *rows])]
     edge = np.nanmax(kernel.arrays["edge"], initial=0.0)
     if edge > 0.0:
         lines.append(
             f"warning: up to {100.0 * edge:.2g} % of what aggregates came from the outermost "
             "offsets: attraction may reach farther than was sampled"
         )
-    return lines
+    return [*lines, *KERNEL_LEGEND]
 
 
-def kernel_row(kernel, place):
+def kernel_row(kernel: Kernel, at: tuple[int, ...], numerics: bool) -> list[str]:
     """Return the cells of one pair of size classes."""
-    found = {name: float(values[place]) for name, values in kernel.arrays.items()}
+    found = {name: float(values[at]) for name, values in kernel.arrays.items()}
 
-    def cell(name, form, scale=1.0, spread=None):
-        ends = (scale * found[name + end] for end in ("", "_low", "_high"))
-        return with_spread(*ends, form, spread)
+    def cell(name: str, form: str = ".3f", scale: float = 1.0, interval: bool = True) -> str:
+        value, low, high = (scale * found[name + end] for end in ("", "_low", "_high"))
+        return with_interval(value, low, high, form, interval)
 
-    few, (least, most) = "{:.3g}".format, (found[f"alpha_change{end}"] for end in ("_low", "_high"))
-    added = " -" if np.isnan(least) else f" {signed(least)} {signed(most)}"
-    return (
-        kernel.labels[place[2]], kernel.labels[place[3]],
-        cell("width_c", "{:.2f}".format, 1e6), cell("width_a", "{:.2f}".format, 1e6),
-        cell("alpha", share, spread=share) + ("" if np.isnan(found["alpha"]) else added),
-        cell("beta2", few), cell("beta3", few, spread="{:.1g}".format),
-        cell("efficiency3", "{:.3f}".format),
-    )  # fmt: skip
+    return [
+        kernel.labels[at[2]], kernel.labels[at[3]],
+        cell("width_c", ".2f", 1e6, False), cell("width_a", ".2f", 1e6, False),
+        cell("alpha"), cell("beta2", ".3g", 1.0, False), cell("beta3", ".3g"),
+        cell("efficiency3", interval=False),
+        *[between(found["alpha_change_low"], found["alpha_change_high"])] * numerics,
+    ]  # fmt: skip
 
 
-def with_spread(value, low, high, form, spread=None):
-    """Return an estimate, with its error by a function ``spread``; its ends where it is not known,
-    "-" where neither is."""
+def with_interval(
+    value: float, low: float, high: float, form: str = ".3f", interval: bool = True
+) -> str:
+    """Return "0.600 [0.570, 0.631]"; the interval alone where the value is not known, "–" where
+    neither is. ``interval``: False for a known value alone."""
+    if np.isnan(high):
+        return number(value, form)
+    ends = f"[{low:{form}}, {high:{form}}]"
     if np.isnan(value):
-        return "-" if np.isnan(high) else f"[{form(low)}, {form(high)}]"
-    return form(value) + (f" +-{spread(max(value - low, high - value))}" if spread else "")
+        return ends
+    return f"{value:{form}} {ends}" if interval else f"{value:{form}}"
 
 
-def signed(change):
-    """Return "-.040" or "+.040"."""
-    return f"{'-' if change < 0.0 else '+'}{share(abs(change))}"
+def number(value: float, form: str = ".3f") -> str:
+    """Return a number, or "–" where it is not known."""
+    return "–" if np.isnan(value) else f"{value:{form}}"
+
+
+def between(low: float, high: float) -> str:
+    """Return "−0.021 +0.045" of the ends of a change, "–" where they are not known."""
+    return "–" if np.isnan(low) else f"{-abs(low):+.3f} {high:+.3f}".replace("-", "−")
 
 
 def touch_lines(results: Results) -> list[str]:
@@ -255,74 +299,37 @@ def undecided_line(results: Results) -> str:
     return verdict(results)[1].removeprefix("warning: ")
 
 
-def checked_line(results: Results) -> str:
-    """How many replicates were run again, and how many of them flipped; "" for none."""
+def numerics_line(results: Results) -> str:
+    """Return the numerical error of a study in one line."""
     table = results.probabilities
     checked, flipped = (int(table[name].sum()) for name in ("n_checked", "n_flipped"))
     if not checked:
-        return ""
-    low, high = (100.0 * float(end) for end in wilson(flipped, checked))
+        return "Numerical error: not known, as no replicate was run again."
+    runs = "none of" if not flipped else f"{flipped} of"
+    line = f"Numerical error: {runs} {checked} re-runs changed its outcome"
+    return f"{line}; Pr[A] would change by {largest_change(results.numerics, 'pr_a_change')}."
+
+
+def third_line(results: Results) -> str:
+    """Return how many replicates were run a third time, and how many of these flipped."""
+    table = results.probabilities
     thrice, late = (int(table[name].sum()) for name in ("n_third", "n_third_flipped"))
-    third = f"; {thrice} of them were run a third time, {late} of which ended differently from the"
-    return (
-        f"{checked} replicates were run again more accurately, {flipped} of them flipped: "
-        f"{100.0 * flipped / checked:.2g} % [{low:.2g}, {high:.2g}]"
-        f"{f'{third} second' if thrice else ''}"
-    )
+    return f"{thrice} of them were run a third time; {late} of these ended otherwise once more"
 
 
-def change_lines(results: Results) -> list[str]:
-    """Between what Pr[A] would change if all were run exactly, and if outlines were cut otherwise,
-    in the conditions where it is most.
-
-    A line for each of the two that is known.
-    """
-    shape = "shape: with outlines cut closer or wider, within their bands,"
-    return [
-        f"{what} Pr[A] would change by {worst} at most, 95 %"
-        for what, group, name in (
-            ("if all replicates were exact,", results.numerics, "pr_a_change"),
-            (shape, results.outlines, "pr_a_shape"),
-        )
-        if (worst := worst_changes(results, group, name))
-    ]
+def outlines_line(results: Results) -> str:
+    """Return by how much Pr[A] would change with outlines cut otherwise; "" where not known."""
+    change = largest_change(results.outlines, "pr_a_shape")
+    words = "Outlines: cut closer or wider, within their bands, Pr[A] would change by"
+    return f"{words} {change}." if change else ""
 
 
-def worst_changes(results, group, name):
-    """Return the lowest and the highest change in a group of tables; "" for none."""
-    if not group or not np.isfinite(group[f"{name}_low"]).any():
+def largest_change(group: Mapping[str, np.ndarray], name: str) -> str:
+    """Return "at most −0.100 to +0.050 in any condition (95 %)" of a group of changes, "" where
+    none is known."""
+    ends = [group[f"{name}{end}"] for end in ("_low", "_high")] if group else []
+    if not ends or not np.isfinite(ends[0]).any():
         return ""
-    words = []
-    for end, worst_of in (("_low", np.nanargmin), ("_high", np.nanargmax)):
-        values = group[name + end]
-        t, v, d = np.unravel_index(worst_of(values), values.shape)
-        words.append(
-            f"{values[t, v, d]:+.3f} (type {results.types[t]}, N = {results.vertices[v]}, "
-            f"delta {results.delta[d]:g})"
-        )
-    return " to ".join(words)
-
-
-def with_errors(table, name, place):
-    """Return a probability +- sampling error +- numerical error, e.g. ".600 +-.031 +-.004".
-
-    The longer side of the 95 % interval; "-" for a numerical error of which nothing is known, and
-    the interval alone where the value is not.
-    """
-    *known, numerical = (table[name + end][place] for end in ("", "_low", "_high", "_numerical"))
-    cell = with_spread(*known, share, share)
-    if np.isnan(known[0]):
-        return cell
-    return f"{cell} {'-' if np.isnan(numerical) else f'+-{share(numerical)}':>6}"
-
-
-def shape_error(outlines, place):
-    """By how much Pr[A] would change with other outlines, e.g. "-.021 +.045"."""
-    low, high = (outlines[f"pr_a_shape{end}"][place] for end in ("_low", "_high"))
-    return "-" if np.isnan(low) else f"-{share(-low)} +{share(high)}"
-
-
-def share(value):
-    """Three decimals in four characters: ".345", "1.00"."""
-    text = f"{value:.3f}"
-    return text[1:] if text.startswith("0") else text[:4]
+    least, most = abs(float(np.nanmin(ends[0]))), float(np.nanmax(ends[1]))
+    words = f"±{most:.3f}" if math.isclose(least, most) else f"−{least:.3f} to +{most:.3f}"
+    return f"at most {words} in any condition (95 %)"

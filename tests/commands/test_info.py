@@ -4,6 +4,7 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.ensembles.contents import info_of
+from flocsim.ensembles.pairs.results import CONTENTS
 from flocsim.io.shape_library import SHIPPED
 from tests.helpers.results_files import write_results
 from tests.helpers.small_rates import mixed
@@ -20,10 +21,9 @@ def test_how_many_stick_and_how_many_hang_is_told(tmp_path):
     assert told.split("  ")[-1].strip() == "{} certificate, {} hook, {} rest".format(*held)
     # And of each condition what share of Pr[A] hangs.
     share = results.probabilities["pr_bond"][0, 0, 0, 1]
-    (heads,) = [line.split() for line in lines if line.split()[:2] == ["N", "ta"]]
-    row = lines[-4].replace("[", "").replace("]", "").split()
-    assert "hang" in heads
-    assert f"{share:.3f}"[1:] in row
+    table = CONTENTS.table(results, every=True).splitlines()
+    assert "hang" in table[0].split()
+    assert f"{share:.3f}" in table[2].split()
 
 
 @pytest.mark.parametrize("complete", [True, False])

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 
+import attrs
 import numpy as np
 import pytest
 
@@ -98,14 +99,27 @@ def test_info_tells_conditions_and_origin(study, capsys):
     assert facts["outcomes"].startswith(f"{a} A, ")
     assert f"{undecided} undecided, {failed} failed" in facts["outcomes"]
     checked, flipped = (made.probabilities[name].sum() for name in ("n_checked", "n_flipped"))
-    again = f"{checked} replicates were run again more accurately, {flipped} of them"
-    assert facts["numerical error"].startswith(again)
+    assert f"Numerical error: {flipped} of {checked} re-runs changed its outcome" in text
 
 
 def test_info_ends_with_the_table_of_probabilities(study, capsys):
     call("info", study)
-    table = format_table(make_results(count=8))
-    assert capsys.readouterr().out.endswith("\n\n" + table + "\n")
+    table = format_table(make_results(count=8), numerics=True)
+    assert "\n\n" + table + "\nNumerical error" in capsys.readouterr().out
+
+
+def test_info_adds_the_columns_that_are_asked_for(tmp_path, capsys):
+    results = make_results(count=8)
+    some = {f"{name}_numerical": np.zeros(results.shape) for name in ("pr_a", "pr_inside")}
+    quiet = attrs.evolve(results, probabilities=results.probabilities | some)
+    write_results(tmp_path / "r.h5", quiet)
+    heads = {}
+    for option in ("", "--numerics", "--all"):
+        call("info", str(tmp_path / "r.h5"), *filter(None, [option]))
+        text = capsys.readouterr().out
+        (heads[option],) = [line for line in text.splitlines() if "Pr[A] [low, high]" in line]
+    assert "numerics" not in heads[""] and "numerics Pr[A]" in heads["--numerics"]
+    assert heads["--all"].split()[-1] == "failed" and "other" not in heads["--all"]
 
 
 def test_info_gives_the_config_back_exactly(study, capsys):

@@ -82,13 +82,13 @@ def test_the_error_is_printed_stored_and_drawn(folder, in_tmp, one_figure, capsy
     assert main(["info", "study.h5"]) == 0
     described = capsys.readouterr().out
     for text in (printed, described):
-        assert "of Pr[A]" in text
-        assert "shape: with outlines cut closer or wider, within their bands, Pr[A] would" in text
+        assert "outlines Pr[A]" in text
+        assert "Outlines: cut closer or wider, within their bands, Pr[A] would change by" in text
     opened = flocsim.open("study.h5")
     table = opened.to_xarray("outlines")
     assert (table["pr_a_shape_low"] <= 0.0).all() and (table["pr_a_shape_high"] >= 0.0).all()
     assert main(["report", "study.h5"]) == 0
-    assert "shape: with outlines cut closer or wider" in (folder / "study.html").read_text("utf-8")
+    assert "Outlines: cut closer or wider" in (folder / "study.html").read_text("utf-8")
 
 
 def test_rows_follow_from_the_ends_of_the_bands(folder):

@@ -34,7 +34,7 @@ def test_a_run_prints_its_table_and_writes_its_file(folder, capsys):
     assert errors == ""
     lines = output.splitlines()
     assert lines[0].startswith("12 replicates: 2 types x 1 vertex count x 2 displacements")
-    assert "type I" in lines
+    assert "type I: r_i = 16.41 µm, r_j = 23.02 µm" in lines
     assert lines[-1].startswith("small.h5: 12 replicates, 12 of them run in ")
     assert read_results(folder / "small.h5").replicates["outcome"].shape == (2, 1, 2, 3)
 
@@ -62,9 +62,9 @@ def test_options_replace_the_configs_values(folder, capsys):
 
 
 def test_a_dry_run_says_what_would_happen_and_writes_nothing(folder, capsys):
-    code, output, errors = call(capsys, "small.toml", "--dry-run", "--output", "no/where.h5")
+    code, output, errors = call(capsys, "small.toml", "--dry-run", "--verbose", "-o", "no/where.h5")
     assert (code, errors) == (0, "")
-    assert output.startswith("4 conditions x 3 replicates = 12, seed 1, on 1 rank, ")
+    assert output.startswith("12 pairs: 4 conditions of 3 replicates, seed 1, on 1 rank; ")
     for said in ("D_0 = 45.35 um", "settling alone: i 60.29 mm/s", "in:  StokesDrag(",
                  "nothing was run (--dry-run)"):  # fmt: skip
         assert said in output
@@ -74,7 +74,7 @@ def test_a_dry_run_says_what_would_happen_and_writes_nothing(folder, capsys):
 def test_a_dry_run_names_what_is_left_out(folder, capsys):
     write_small(folder, name="weak.toml", text=(folder / "small.toml").read_text()
                 + '[zone]\ndistance = "1 um"\n[forces.van_der_waals]\nhamaker = 0\n')  # fmt: skip
-    code, output, _ = call(capsys, "weak.toml", "--dry-run")
+    code, output, _ = call(capsys, "weak.toml", "--dry-run", "--verbose")
     assert code == 0
     assert "out: VanDerWaals: " in output
 

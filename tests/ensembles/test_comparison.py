@@ -123,9 +123,9 @@ def test_the_command_says_what_differs(files, capsys):
     assert main(["compare", str(a), str(b)]) == 0
     said = capsys.readouterr().out
     assert "replicates that both have, paired" in said
-    assert re.search(r"-0\.211 \[-0\.330, -0\.071\] -0\.\d+ \+0\.\d+\n", said)
+    assert re.search(r"-0\.211 \[-0\.330, -0\.071\]  -0\.\d+ \+0\.\d+\n", said)
     exact = comparison_without_numerics(a, b)
-    assert "-0.211 [-0.330, -0.071] +0.000 +0.000 *" in exact.table()
+    assert re.search(r"-0\.211 \[-0\.330, -0\.071\] +\*\n", exact.table())
     opened = flocsim.open(a), flocsim.open(b)
     for each, value in zip(opened, (1.0, 2.0), strict=True):
         each.run["identity"] = json.dumps({"forces.contact.k_n": value})

@@ -104,7 +104,7 @@ def test_what_is_said_of_a_study_is_of_its_largest_flocs(folder):
     assert facts["from6um-from6um", "i"] == pytest.approx(13e-6)
     heavier = load_text(folder, STUDY, {"bodies": {"surface_density": 2.1}})
     assert any("r_eq = 20 um" in line for line in study_warnings(heavier))
-    said = dry_run(config, 1, pilot=False)
+    said = dry_run(config, 1, verbose=True)
     assert "size classes, r_eq: to6um 3 to 5 um (2 flocs), from6um 8 to 20 um (3 flocs)" in said
     assert "library" in said and "drawn by number" in said
     assert "r_i 3 to 5 um, r_j 8 to 20 um" in said

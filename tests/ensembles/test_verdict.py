@@ -47,4 +47,4 @@ def test_too_many_without_an_outcome_have_a_code_of_their_own(undecided, failed,
 
 
 def test_the_table_has_the_interval_of_what_may_be_anything():
-    assert "[.000, 1.00]" in CONTENTS.told(with_ends(2, 0))
+    assert "[0.000, 1.000]" in CONTENTS.table(with_ends(2, 0))

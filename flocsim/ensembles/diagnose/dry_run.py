@@ -1,6 +1,6 @@
-"""`--dry-run`: what is known of a study without running it, a question a line.
+"""`--dry-run`: what a study would run, how long it takes and what is doubtful, without running it.
 
-Its collisions, forces, time scales and warnings; with a pilot, what it will take.
+With ``--verbose`` also its collisions, forces and time scales.
 """
 
 import math
@@ -22,23 +22,32 @@ from flocsim.io.results.schema import OUTCOMES
 from flocsim.io.terminal import duration
 
 
-def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
-    """Return what is known of a study of pairs or rates before it is run, as text."""
+def dry_run(config: Config, ranks: int, pilot: bool = False, verbose: bool = False) -> str:
+    """Return what is known of a study of pairs or rates before it is run, as text.
+
+    ``pilot``: run some replicates, to say how long it takes; ``verbose``: add its collisions, and
+    what the engine makes of its forces.
+    """
     measured = measured_flocs(config)
-    pairs = list(sphere_pairs(config, measured))
-    return "\n".join([
-        *study_lines(config, ranks),
-        "collisions:",
-        *(f"  {line}" for line in collision_lines(config, measured)),
-        "forces:",
-        *(f"  {line}" for line in force_lines(pairs[0][1].system)),
-        "stiffness:",
-        *(f"  {name}: {line}" for name, pair in pairs for line in scale_lines(pair.system)),
-        *warning_lines(study_warnings(config, measured)),
-        *(["pilot:", *(f"  {line}" for line in pilot_lines(config, ranks))] if pilot else []),
-        "only the pilot was run (--dry-run)" if pilot
-        else "nothing was run (--dry-run); --pilot runs some replicates, to estimate the cost",
-    ])  # fmt: skip
+    lines = study_lines(config, ranks)
+    lines += pilot_lines(config, ranks) if pilot else [UNKNOWN_TIME]
+    lines += warning_lines(study_warnings(config, measured))
+    if verbose:
+        pairs = list(sphere_pairs(config, measured))
+        lines += [
+            "collisions:",
+            *(f"  {line}" for line in collision_lines(config, measured)),
+            "forces:",
+            *(f"  {line}" for line in force_lines(pairs[0][1].system)),
+            "time scales:",
+            *(f"  {name}: {line}" for name, pair in pairs for line in scale_lines(pair.system)),
+        ]
+    ran = "only the pilot was run" if pilot else "nothing was run"
+    return "\n".join([*lines, f"{ran} (--dry-run){'' if verbose else VERBOSE}"])
+
+
+UNKNOWN_TIME = "time: not known; --pilot runs some replicates for some seconds to estimate it"
+VERBOSE = "; --verbose shows collisions, forces and time scales"
 
 
 def study_lines(config: Config, ranks: int) -> list[str]:
@@ -48,8 +57,8 @@ def study_lines(config: Config, ranks: int) -> list[str]:
     if scene.meeting == BROWNIAN:
         meeting = f"brownian: from {scene.release:g} to {scene.escape:g} (r_i + r_j) apart"
     else:
-        offsets = f"delta {list(scene.delta)} of the {scene.delta_max} delta_max"
-        meeting = f"{offsets}, receiver {scene.receiver}"
+        offsets = ", ".join(f"{each:g}" for each in scene.delta)
+        meeting = f"δ = {offsets} of the {scene.delta_max} δ_max; receiver {scene.receiver}"
     flocs = [f"{shapes.label} {shapes.file or ''}".strip()]
     if shapes.size == "own":
         flocs += ["at their measured sizes and spheroradii"]
@@ -59,14 +68,15 @@ def study_lines(config: Config, ranks: int) -> list[str]:
     flocs += [f"outlines {shapes.outlines}"] if shapes.outlines != CUT else []
     flocs += ["pairs alike in error"] if shapes.pairs_alike_in == "error" else []
     accuracy = f"tolerance {method.tolerance:g} m" if method.tolerance < math.inf else "fixed step"
+    total, vertices = count * config.replicates, ", ".join(map(str, shapes.vertices))
     return [
-        f"{count} conditions x {config.replicates} replicates = {count * config.replicates}, "
-        f"seed {config.seed}, on {ranks} rank{'s' * (ranks != 1)}, results in {config.output.file}",
-        f"  vertices {list(shapes.vertices)}, {meeting}",
+        f"{total} pairs: {count} conditions of {config.replicates} replicates, seed {config.seed}, "
+        f"on {ranks} rank{'s' * (ranks != 1)}; results in {config.output.file}",
+        f"  conditions: types {', '.join(scene.names)}; N = {vertices}; {meeting}",
         f"  flocs: {', '.join(flocs)}",
         *([f"  {words}"] if (words := config.fluid.words) else []),
-        f"  integrator: {config.integrator.label}, {accuracy}",
-        f"  run again: {checked_words(config)}",
+        f"  method: {config.integrator.label}, {accuracy}",
+        f"  numerical error: {checked_words(config)}",
     ]
 
 
@@ -75,11 +85,11 @@ def checked_words(config: Config) -> str:
     exact, share = exact_method(config.integrator.method), config.integrator.check_share
     count = 0 if exact is None else count_checks(config.seed, config.replicates, share)
     if exact is None or not count:
-        return "none, so that the numerical error stays unknown (integrator.check_share)"
+        return "not known, as no replicate is run again (integrator.check_share)"
     finer = exact.tolerance < math.inf
     how = f"tolerance of {exact.tolerance:g} m" if finer else f"step of {exact.first_step:g} s"
-    more = ", more of those that flip easily" * (share == "auto")
-    return f"{count} of the {config.replicates} replicates of each condition{more}, at a {how}"
+    least = "at least " * (share == "auto")
+    return f"from {least}{count} re-runs in each condition, at a {how}"
 
 
 def collision_lines(config: Config, flocs: Sequence[Floc]) -> Iterator[str]:
@@ -118,13 +128,14 @@ def pilot_lines(config: Config, ranks: int) -> list[str]:
     except MemoryError:
         raise
     except Exception as error:  # a class of the user's own may raise anything
-        return [f"none could be run: {' '.join(str(error).split())}"]
+        return [f"time: not known, as the pilot failed: {' '.join(str(error).split())}"]
     words = ", ".join(f"{found.ended[name]} {name}" for name in OUTCOMES if found.ended[name])
     most = f" at {found.replicates} replicates of a condition"
     hours = [each / 3600.0 for each in (found.cpu, found.low, found.high)]
     return [
-        f"ran {found.ended.total()} replicates; they ended {words}",
-        f"core-hours{most * (found.replicates < config.replicates)}: {hours[0]:.2g} "
-        f"({hours[1]:.2g} to {hours[2]:.2g}); on {ranks} rank{'s' * (ranks != 1)} "
-        f"{duration(found.cpu / ranks)}, and some tens of seconds where code is compiled first",
+        f"time: {duration(found.cpu / ranks)} on {ranks} rank{'s' * (ranks != 1)}, and some tens "
+        "of seconds where code is compiled first",
+        f"  core-hours{most * (found.replicates < config.replicates)}: {hours[0]:.2g} "
+        f"({hours[1]:.2g} to {hours[2]:.2g}), by a pilot of {found.ended.total()} replicates, "
+        f"which ended {words}",
     ]

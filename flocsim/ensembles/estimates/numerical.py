@@ -203,8 +203,9 @@ def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray
     which LATE_RATES is known beforehand. Where any may flip, ``most`` is one at least.
     """
     flips, runs = np.sum(flipped), np.sum(checked)
-    weights = weights_of(*LATE_RATES, flips, runs)
-    found = predicted(*LATE_RATES[:2], weights, np.broadcast_arrays(flips, runs, exposed))
+    k, m, log_prior = LATE_RATES
+    weights = weights_of(k, m, log_prior, flips, runs)
+    found = predicted(k, m, weights, np.broadcast_arrays(flips, runs, exposed))
     found[0] = np.maximum(found[0], exposed > 0.0)
     return found
 
@@ -245,7 +246,7 @@ def further_flips(
     # Conditions of the same f of c weigh the distributions alike: computed once, counted often.
     seen, times = np.unique(np.stack([f.ravel(), c.ravel()]), axis=1, return_counts=True)
     k, m = (each.ravel() for each in np.meshgrid(SHAPES, MEANS))
-    weights = weights_of(k, m, 0.5 * np.log(m), *seen, times)
+    weights = weights_of(k, m, 0.5 * np.log(m), seen[0], seen[1], times)
     some = weights > NEGLIGIBLE
     return predicted(k[some], m[some], weights[some] / weights[some].sum(), (f, c, u), confidence)
 

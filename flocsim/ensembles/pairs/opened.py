@@ -20,7 +20,7 @@ from flocsim.ensembles.config.sources import Allowed, Sources
 from flocsim.ensembles.contents import Example, stored_in
 from flocsim.ensembles.diagnose.spheres import water_facts
 from flocsim.ensembles.kind import study_of
-from flocsim.ensembles.report import checked_line, format_table
+from flocsim.ensembles.pairs.results import CONTENTS
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study, says_outcome
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
@@ -177,7 +177,7 @@ class StudyResults(Tables):
 
     def table(self) -> str:
         """Counts and probabilities of every condition as the command prints them, as text."""
-        return "\n".join(filter(None, [format_table(self.results), checked_line(self.results)]))
+        return CONTENTS.table(self.results)
 
     def labelled(self, group: str = "probabilities") -> Labelled:
         """The arrays of a group of the file with their axes; UsageError for an unknown one."""

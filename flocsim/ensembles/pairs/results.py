@@ -22,6 +22,7 @@ from flocsim.io.labelled import Labelled
 from flocsim.io.results import run_group, schema
 from flocsim.io.results.events import ends_of
 from flocsim.io.results.file import read_results
+from flocsim.io.results.numerics import numerics_matter
 from flocsim.io.results.run_group import stored
 
 SAID_APART = (report.MOST_UNDECIDED, "settling", "size_classes", "equivalent_spheres")
@@ -92,10 +93,10 @@ def swept_table(table: Labelled) -> tuple[Sequence[str], Row]:
 
     def row(place: tuple[int, ...]) -> Sequence[str]:
         counts = (str(each[place]) for each in (columns["n_total"], *ends.values()))
-        pr_a, low, high = (columns[name][place] for name in ("pr_a", "pr_a_low", "pr_a_high"))
-        return *counts, report.with_spread(pr_a, low, high, report.share, report.share)
+        pr_a = (columns[name][place] for name in ("pr_a", "pr_a_low", "pr_a_high"))
+        return *counts, report.with_interval(*pr_a)
 
-    return ("n", *ends, "Pr[A] 95 %"), row
+    return ("n", *ends, "Pr[A] [low, high]"), row
 
 
 class PairFiles(Contents):
@@ -122,26 +123,28 @@ class PairFiles(Contents):
         """Return what a results file says of its study."""
         run = results.run
         facts = conditions(results) + sizes(results) + outcomes(results)
-        checked = report.checked_line(results) or "unknown: no replicate was run again"
-        facts.append(("numerical error", checked))
-        facts += [("", line) for line in report.change_lines(results)]
         facts += settling(run) + thermal(run)
-        facts += [("touched", line) for line in report.touch_lines(results)]
         more = filter(None, [report.undecided_line(results)])
         return study_summary(facts, run, run_group.describe_note, SAID_APART, more)
 
-    def table(self, results: schema.Results) -> str:
+    def table(self, results: schema.Results, numerics: bool = False, every: bool = False) -> str:
         """Return the rates; or the efficiencies, if there are any, and the counts and
-        probabilities."""
-        if results.kernel is not None:
-            return "\n".join(report.kernel_lines(results.kernel))
-        before = report.efficiency_lines(results)
-        return "\n".join([*before, *[""] * bool(before), report.format_table(results)])
+        probabilities; and their errors.
 
-    def told(self, found: schema.Results) -> str:
-        """Return what is printed of a study that has been run."""
-        errors = report.checked_line(found), *report.change_lines(found)
-        return "\n".join([self.table(found), *report.touch_lines(found), *filter(None, errors)])
+        ``numerics``, ``every``: as of `report.format_table`; numerics also where they matter.
+        """
+        numerics = numerics or every or numerics_matter(results)
+        if results.kernel is not None:
+            lines = report.kernel_lines(results.kernel, numerics)
+        else:
+            lines = [*report.efficiency_lines(results)]
+            lines += [""] * bool(lines)
+            lines.append(report.format_table(results, numerics, every))
+        lines += [*report.touch_lines(results), report.numerics_line(results)]
+        lines += [report.third_line(results)] * every
+        return "\n".join(filter(None, [*lines, report.outlines_line(results)]))
+
+    detailed = table
 
     def running(self, found: Any) -> Facts:
         """Return the conditions of a study of pairs that still runs."""
@@ -152,8 +155,6 @@ class PairFiles(Contents):
             *axes_of(results),
             ("replicates", f"{counts.min()} to {counts.max()} in each of {counts.size} conditions"
              f"{planned}"),
-            ("numerical error",
-             report.checked_line(results) or "unknown: no replicate was run again yet"),
         ]  # fmt: skip
 
     def figures(self, found: schema.Results) -> Figures:

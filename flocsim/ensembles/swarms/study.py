@@ -486,8 +486,8 @@ BODY_BYTES = 8 * 6 + 4
 """Bytes of a body in a snapshot."""
 
 
-def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
-    """Return all that is known of a study before it is run."""
+def dry_run(config: Config, ranks: int, pilot: bool = False, verbose: bool = False) -> str:
+    """Return what is known of a study before it is run; ``verbose``: its forces and time scales."""
     study = SwarmStudy(config)
     study.prepare()
     scene, (swarm, drawn), pair = study.scene, study.beginning, study.largest_pair()
@@ -502,8 +502,9 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         )
     size = config.replicates * study.pieces * len(swarm.bodies) * BODY_BYTES
     lines = [
-        f"{config.replicates} swarms of {scene.number} bodies, N = {study.vertices}, seed "
-        f"{config.seed}, on {ranks} rank{'s' * (ranks != 1)}, results in {config.output.file}",
+        f"{config.replicates} swarm{'s' * (config.replicates != 1)} of {scene.number} bodies, "
+        f"N = {study.vertices}, seed {config.seed}, on {ranks} rank{'s' * (ranks != 1)}; results "
+        f"in {config.output.file}",
         f"  r_eq {radii.min():.4g} to {radii.max():.4g} um, median {np.median(radii):.4g}",
         f"  box {width:.5g} x {height:.5g} um, periodic: {scene.periodic}"
         f"{', with a floor' if scene.floor else ''}; bodies cover {area / (width * height):.4f}",
@@ -511,15 +512,13 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         f"  {study.pieces} snapshots, one every {scene.interval:g} s; a state to resume from every "
         f"{duration(scene.checkpoint)}; results file about {size / 1e6:.3g} MB",
         f"  {config.fluid.words}",
-        f"  integrator: {config.integrator.label}, tolerance "
-        f"{config.integrator.method.tolerance:g} m",
-        "forces:",
-        *(f"  {line}" for line in force_lines(pair)),
-        "stiffness, of the two largest:",
-        *(f"  {line}" for line in scale_lines(pair)),
+        f"  method: {config.integrator.label}, tolerance {config.integrator.method.tolerance:g} m",
         *warning_lines(study.doubts()),
-        "nothing was run (--dry-run)",
     ]
+    if verbose:
+        lines += ["forces:", *(f"  {line}" for line in force_lines(pair))]
+        lines += ["time scales of the two largest:", *(f"  {line}" for line in scale_lines(pair))]
+    lines.append(f"nothing was run (--dry-run){'' if verbose else '; --verbose shows forces'}")
     return "\n".join(filter(str.strip, lines))
 
 

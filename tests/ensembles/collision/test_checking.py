@@ -79,16 +79,16 @@ def test_a_method_without_tolerance_and_step_is_not_checked(tmp_path):
     assert exact_method(Unchangeable()) is None
     config = small_config(tmp_path, {"shapes": {"vertices": (1,)}})
     for share in ("auto", 0.2):
-        assert "none" in checked_words(with_method(config, Unchangeable(), check_share=share))
+        assert "not known" in checked_words(with_method(config, Unchangeable(), check_share=share))
 
 
 def test_the_dry_run_says_how_many_and_at_what(tmp_path):
     config = small_config(tmp_path, {"replicates": 1000, "shapes": {"vertices": (1,)}})
     words = checked_words(config)
-    assert f"{count_checks(1, 1000, 'auto')} of the 1000 replicates" in words
+    assert f"{count_checks(1, 1000, 'auto')} re-runs in each condition" in words
     assert "1e-11 m" in words
     off = small_config(tmp_path, {"integrator": {"check_share": 0.0}})
-    assert "none" in checked_words(off)
+    assert "not known" in checked_words(off)
 
 
 def test_a_second_run_is_that_of_the_tighter_tolerance_and_changes_nothing_else(tmp_path):

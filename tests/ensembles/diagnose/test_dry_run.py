@@ -16,26 +16,36 @@ def spheres(folder, **over):
 
 def test_the_pilot_says_what_the_study_takes(tmp_path):
     text = dry_run.dry_run(spheres(tmp_path), 2, pilot=True)
-    assert re.search(r"ran (\d+) replicates; they ended \1 A", text)
-    [hours] = re.findall(r"core-hours: (\S+) \((\S+) to (\S+)\); on 2 ranks \d", text)
+    assert re.search(r"time: \d+.* on 2 ranks", text)
+    assert re.search(r"by a pilot of (\d+) replicates, which ended \1 A", text)
+    [hours] = re.findall(r"core-hours: (\S+) \((\S+) to (\S+)\), by", text)
     value, low, high = map(float, hours)
     assert 0.0 < low < value < high
-    assert text.endswith("only the pilot was run (--dry-run)")
+    assert text.splitlines()[-1].startswith("only the pilot was run (--dry-run)")
 
 
 def test_without_a_pilot_nothing_is_run(tmp_path):
     text = dry_run.dry_run(spheres(tmp_path), 1)
-    assert "pilot:" not in text
-    assert "nothing was run (--dry-run); --pilot runs some replicates" in text
+    assert "time: not known; --pilot runs some replicates" in text
+    assert "nothing was run (--dry-run); --verbose shows" in text
+    # What is asked first: what would run, how long it takes, what is doubtful.
+    assert text.splitlines()[0].startswith("450 pairs: 15 conditions of 30 replicates")
+    assert "time scales:" not in text
+
+
+def test_the_engine_is_shown_when_asked(tmp_path):
+    text = dry_run.dry_run(spheres(tmp_path), 1, verbose=True)
+    for head in ("collisions:", "forces:", "time scales:"):
+        assert head in text.splitlines()
+    assert text.endswith("nothing was run (--dry-run)")
 
 
 def test_a_machine_without_a_compiler_is_told_the_rest(folder, environment, capsys):
     environment["NUMBA_DISABLE_JIT"] = "1"
     assert main(["ensemble", "small.toml", "--dry-run", "--pilot"]) == 0
-    told = capsys.readouterr()
-    lines = told.out.splitlines()
-    assert re.match("  none could be run: .*NUMBA_DISABLE_JIT is set", lines[-2])
-    assert any(line.startswith("stiffness:") for line in lines) and told.err == ""
+    printed = capsys.readouterr()
+    assert re.search("time: not known, as the pilot failed: .*NUMBA_DISABLE_JIT", printed.out)
+    assert printed.err == ""
 
 
 def test_a_signal_ends_the_pilot(folder, stopping, capsys):

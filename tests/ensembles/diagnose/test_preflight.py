@@ -223,7 +223,7 @@ def test_numbers_of_every_body(tmp_path):
 
 
 def test_a_dry_run_tells_numbers_and_doubts(tmp_path):
-    lines = dry_run(small_config(tmp_path, WILD), 1, pilot=False).splitlines()
+    lines = dry_run(small_config(tmp_path, WILD), 1, verbose=True).splitlines()
     assert sum(line.startswith("warning: ") for line in lines) == 4
     [told] = [line for line in lines if line.startswith("    settling alone: i ")]
     assert "; j " in told and "Re = " in told and "St = " in told

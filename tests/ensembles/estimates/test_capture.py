@@ -195,7 +195,7 @@ def test_a_study_cut_short_holds_the_rates_of_the_whole(tmp_path):
     assert np.isnan(here["beta2"]).all() and here["alpha_high"].max() <= 1.0
     assert too_many_undecided(cut) and not too_many_undecided(whole)
     assert "undecided" in undecided_line(cut) and undecided_line(whole) == ""
-    assert "[0.00, " in "\n".join(kernel_lines(cut.kernel))
+    assert "[0.00, " in "\n".join(kernel_lines(cut.kernel, numerics=False))
 
 
 def test_intervals_are_students_of_the_scrambles():

@@ -9,13 +9,19 @@ import pytest
 from scipy.stats import binom, norm
 
 from flocsim.ensembles.config.schema import StopConfig
+from flocsim.ensembles.estimates.numerical import (
+    change_columns,
+    change_intervals,
+    count_changes,
+)
 from flocsim.ensembles.estimates.statistics import (
     CODES,
     borders,
+    count,
     stop_rule,
 )
 from flocsim.ensembles.parallel.communicator import Communicator
-from flocsim.ensembles.report import format_table
+from flocsim.ensembles.report import format_table, numerics_line
 from flocsim.ensembles.runner import run, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME
 from flocsim.errors import UsageError
@@ -198,43 +204,52 @@ def test_table_is_aligned_and_narrow(count):
     table = dict(results.probabilities)
     for name in COUNTS:
         table[name] = np.minimum(table[name] * count, count)
-    text = format_table(attrs.evolve(results, probabilities=table))
+    for name in ("n_held", "n_undecided", "n_failed"):
+        table[name] = np.zeros_like(table[name])
+    text = format_table(attrs.evolve(results, probabilities=table), numerics=False)
     lines = text.splitlines()
-    assert lines[-1].startswith("delta 1: by construction the outlines just graze")
-    rows = [line for line in lines[2:-1] if not line.startswith("type")]
+    assert lines[-1].startswith("δ = 1: outlines just graze")
+    rows = [line for line in lines[1:-3] if not line.startswith("type")]
     assert len(rows) == 3 * 4 * 5
-    assert max(map(len, lines)) <= 110
+    assert max(map(len, lines)) <= 100
     assert len({len(row) for row in rows}) == 1
-    assert text.isascii()
 
 
 def test_table_tells_the_numbers():
     outcome = np.array([0] * 6 + [3] * 3 + [4]).reshape(1, 1, 1, 10)
     inside = np.select([outcome == 0, outcome == 3], [1, 0], NOT_APPLICABLE)
     bond = bonds_of(outcome, np.array([1, 1, 2, 3, 1, 2, 1, 1, 1, 1]))
-    text = format_table(Results(["II"], [16], [0.25], None, tabulate(outcome, inside, bond)))
-    row = text.splitlines()[-1]
-    assert " ".join(row.split()) == (
-        "16 0.25 10 9 6 .667 +-.312 - .667 +-.312 - .333 6 0 0 3 1 0 0"
-    )
-    assert "type II" in text
+    results = Results(["II"], [16], [0.25], None, tabulate(outcome, inside, bond))
+    lines = format_table(results, numerics=False).splitlines()
+    assert lines[1] == "type II"
+    cells = "16 0.25 10 0.667 [0.354, 0.879] 0.667 [0.354, 0.879] 6 0 0 3 1 missed"
+    assert " ".join(lines[2].split()) == cells
+    # All columns: how many of A and C hang, how many collided, and did so inside, and the rest.
+    row = format_table(results, numerics=False, every=True).splitlines()[2]
+    assert " ".join(row.split()[-11:]) == "6 0 0 3 0.333 9 6 1 0 0 0"
 
 
 def test_table_shows_a_dash_without_events():
     table = tabulate(np.full((1, 1, 1, 2), 4), *[np.full((1, 1, 1, 2), NOT_APPLICABLE)] * 2)
-    row = format_table(Results(["I"], [4], [0.5], None, table)).splitlines()[-1]
-    assert " ".join(row.split()) == "4 0.5 2 0 0 - - - 0 0 0 0 2 0 0"
+    row = format_table(Results(["I"], [4], [0.5], None, table), numerics=False).splitlines()[2]
+    assert " ".join(row.split()) == "4 0.5 2 – – 0 0 0 0 2 missed"
 
 
 def test_table_tells_the_numerical_error():
     outcome = np.zeros((1, 1, 1, 40), dtype=int)
     first = outcome, outcome + 1, bonds_of(outcome)
     again = np.where(np.arange(40) < 4, 1, outcome)
-    table = tabulate(*first, again, outcome + 1, bonds_of(again))
-    text = format_table(Results(["III"], [1], [0.0], None, table))
-    assert text.count("1.00 +-.088 +-.000") == 1
+    codes = *first, again, outcome + 1, bonds_of(again)
+    changes = change_columns(change_intervals(count(*first) | count_changes(first, codes[3:])))
+    results = Results(["III"], [1], [0.0], None, tabulate(*codes), numerics=changes)
+    row = format_table(results, numerics=True).splitlines()[2]
     # Four of 40 have departed; all were run again, and none a third time.
-    assert text.count("1.00 +-.088 +-.100") == 1
+    interval = "1.000 [0.912, 1.000]"
+    assert " ".join(row.split()).startswith(
+        f"1 0 40 {interval} −0.000 +0.000 {interval} −0.100 −0.100"
+    )
+    line = numerics_line(results)
+    assert "4 of 40 re-runs changed" in line
 
 
 RULE = {"half_width": 0.12, "least": 10}

@@ -23,9 +23,9 @@ def with_error(error, name="pr_a"):
 
 
 @pytest.mark.parametrize("name", ["pr_a", "pr_inside"])
-def test_an_error_above_half_of_the_half_width_matters(name):
-    assert numerics_matter(with_error(0.051, name))
-    assert not numerics_matter(with_error(0.049, name))
+def test_an_error_above_half_of_the_interval_matters(name):
+    assert numerics_matter(with_error(0.101, name))
+    assert not numerics_matter(with_error(0.099, name))
 
 
 def test_conditions_without_re_runs_do_not_count():
