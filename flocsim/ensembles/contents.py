@@ -355,7 +355,7 @@ class Differences(Tables):
             "[low, high]: 95 % interval of sampling; *: without 0, numerical error included"
         )
         if known and np.isfinite(error).any():
-            most = f"at most ±{np.nanmax(error):.3f} in any condition (95 %)"
+            most = f"±{np.nanmax(error):.3f} at most in any condition (95 %)"
             lines.append(f"Numerical error: exact runs would change a difference by {most}.")
         return "\n".join(lines)
 

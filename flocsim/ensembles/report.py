@@ -1,7 +1,6 @@
 """The table of a study for the terminal."""
 
 import itertools
-import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -306,8 +305,11 @@ def numerics_line(results: Results) -> str:
     if not checked:
         return "Numerical error: not known, as no replicate was run again."
     runs = "none of" if not flipped else f"{flipped} of"
-    line = f"Numerical error: {runs} {checked} re-runs changed its outcome"
-    return f"{line}; Pr[A] would change by {largest_change(results.numerics, 'pr_a_change')}."
+    most = np.nanmax(table["pr_a_numerical"], initial=0.0)
+    return (
+        f"Numerical error: {runs} {checked} re-runs changed its outcome; Pr[A] is uncertain by at "
+        f"most ±{most:.3f} in any condition (95 %)."
+    )
 
 
 def third_line(results: Results) -> str:
@@ -319,17 +321,13 @@ def third_line(results: Results) -> str:
 
 def outlines_line(results: Results) -> str:
     """Return by how much Pr[A] would change with outlines cut otherwise; "" where not known."""
-    change = largest_change(results.outlines, "pr_a_shape")
-    words = "Outlines: cut closer or wider, within their bands, Pr[A] would change by"
-    return f"{words} {change}." if change else ""
-
-
-def largest_change(group: Mapping[str, np.ndarray], name: str) -> str:
-    """Return "at most −0.100 to +0.050 in any condition (95 %)" of a group of changes, "" where
-    none is known."""
-    ends = [group[f"{name}{end}"] for end in ("_low", "_high")] if group else []
-    if not ends or not np.isfinite(ends[0]).any():
+    if not results.outlines or not np.isfinite(results.outlines["pr_a_shape_low"]).any():
         return ""
-    least, most = abs(float(np.nanmin(ends[0]))), float(np.nanmax(ends[1]))
-    words = f"±{most:.3f}" if math.isclose(least, most) else f"−{least:.3f} to +{most:.3f}"
-    return f"at most {words} in any condition (95 %)"
+    least, most = (
+        extreme(results.outlines[f"pr_a_shape_{end}"])
+        for end, extreme in (("low", np.nanmin), ("high", np.nanmax))
+    )
+    return (
+        "Outlines: cut closer or wider, within their bands, Pr[A] would change by "
+        f"{between(least, most).replace(' ', ' to ')} at most in any condition (95 %)."
+    )

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from flocsim.commands import add_command
-from flocsim.ensembles.report import format_table
+from flocsim.ensembles.pairs.results import CONTENTS
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots import results as drawings
 from flocsim.io.plots.results import FIGURES
@@ -104,22 +104,25 @@ def test_info_tells_conditions_and_origin(study, capsys):
 
 def test_info_ends_with_the_table_of_probabilities(study, capsys):
     call("info", study)
-    table = format_table(make_results(count=8), numerics=True)
-    assert "\n\n" + table + "\nNumerical error" in capsys.readouterr().out
+    table = CONTENTS.table(make_results(count=8))
+    assert capsys.readouterr().out.endswith(f"\n\n{table}\n")
 
 
-def test_info_adds_the_columns_that_are_asked_for(tmp_path, capsys):
+def test_columns_of_numerics_are_there_when_asked_for_or_large(study, capsys):
     results = make_results(count=8)
-    some = {f"{name}_numerical": np.zeros(results.shape) for name in ("pr_a", "pr_inside")}
-    quiet = attrs.evolve(results, probabilities=results.probabilities | some)
-    write_results(tmp_path / "r.h5", quiet)
-    heads = {}
-    for option in ("", "--numerics", "--all"):
-        call("info", str(tmp_path / "r.h5"), *filter(None, [option]))
-        text = capsys.readouterr().out
-        (heads[option],) = [line for line in text.splitlines() if "Pr[A] [low, high]" in line]
-    assert "numerics" not in heads[""] and "numerics Pr[A]" in heads["--numerics"]
-    assert heads["--all"].split()[-1] == "failed" and "other" not in heads["--all"]
+    changes = {f"{name}_change_{end}": np.zeros(results.shape)
+               for name in ("pr_a", "pr_inside") for end in ("low", "high")}  # fmt: skip
+    for error, heads in ((0.0, ["", "numerics Pr[A]"]), (0.9, ["numerics Pr[A]"] * 2)):
+        some = {f"{n}_numerical": np.full(results.shape, error) for n in ("pr_a", "pr_inside")}
+        table = results.probabilities | some
+        changed = attrs.evolve(results, probabilities=table, numerics=changes)
+        for asked, head in zip((False, True), heads, strict=True):
+            text = CONTENTS.table(changed, numerics=asked)
+            (first,) = [line for line in text.splitlines() if "Pr[A] [" in line]
+            assert ("numerics" in first) == bool(head) and head in first
+    call("info", study, "--all")
+    (heads,) = [line for line in capsys.readouterr().out.splitlines() if "Pr[A] [" in line]
+    assert heads.split()[-1] == "failed" and "other" not in heads
 
 
 def test_info_gives_the_config_back_exactly(study, capsys):

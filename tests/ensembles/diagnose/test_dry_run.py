@@ -29,7 +29,7 @@ def test_without_a_pilot_nothing_is_run(tmp_path):
     assert "time: not known; --pilot runs some replicates" in text
     assert "nothing was run (--dry-run); --verbose shows" in text
     # What is asked first: what would run, how long it takes, what is doubtful.
-    assert text.splitlines()[0].startswith("450 pairs: 15 conditions of 30 replicates")
+    assert text.splitlines()[0].startswith("120 pairs: 4 conditions of 30 replicates")
     assert "time scales:" not in text
 
 

@@ -204,7 +204,7 @@ def test_table_is_aligned_and_narrow(count):
     table = dict(results.probabilities)
     for name in COUNTS:
         table[name] = np.minimum(table[name] * count, count)
-    for name in ("n_held", "n_undecided", "n_failed"):
+    for name in ("n_missed", "n_held", "n_undecided", "n_failed"):
         table[name] = np.zeros_like(table[name])
     text = format_table(attrs.evolve(results, probabilities=table), numerics=False)
     lines = text.splitlines()
