@@ -103,7 +103,8 @@ def judged(path: str, found: Choices, by_eye: Choices | None) -> Choices:
         raise misfit(path, f"{name} was another file, or has changed since")
     ours, theirs = found["flocs"], by_eye["flocs"]
     if len(ours) != len(theirs):
-        raise misfit(path, f"{name} has {len(ours)} regions now, and had {len(theirs)}")
+        counts = f"is {len(ours)}, and was {len(theirs)}"
+        raise misfit(path, f"the number of regions in {name} {counts}")
     for one, other in zip(ours, theirs, strict=True):
         if not is_same(one, other):
             raise misfit(path, f"floc {one['floc']} of {name} is not the one that was judged")

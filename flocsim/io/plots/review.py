@@ -54,7 +54,8 @@ def section_of(place: int, picture: Any, jpeg: bytes) -> str:
     # Whole numbers are the centres of pixels.
     return (
         f"<section><h2>{name}</h2>{alarms}<div class='frame'>"
-        f"<svg role='group' aria-label='{name}' viewBox='-0.5 -0.5 {width} {height}'>"
+        f"<svg role='group' aria-label='{name}' viewBox='-0.5 -0.5 {width} {height}' "
+        f"style='--wide: {width}; --high: {height}'>"
         f"<image x='-0.5' y='-0.5' width='{width}' height='{height}' "
         f"href='data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}'/>\n"
         + "\n".join(outlines)
