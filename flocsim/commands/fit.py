@@ -106,12 +106,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--vertices", type=several(whole), default="4,8,16,64")
     add("--radius", type=several(positive), default="1", dest="radii")
     add("--method", default="pattern", choices=("pattern", "paper", "even"))
-    for flag in ("--preserve-area", "--inscribed", "--holes", "--band", "--masks", "--review"):
+    for flag in ("--preserve-area", "--inscribed", "--holes", "--band", "--masks"):
         add(flag, action="store_true")
     add("--jobs", type=whole, default=1)
     add("-o", "--output", default="shapes.h5")
-    for name in ("--overlay", "--fits", "--masks-out", "--reviewed"):
+    for name in ("--overlay", "--fits", "--masks-out"):
         add(name)
+    add("--review", action="store_true")
+    add("--reviewed")
     add("--memory", type=lambda text: 1e9 * positive(text), default="1.3")
     add_overwrite(parser)
     add = parser.add_argument_group("finding flocs").add_argument
@@ -215,6 +217,8 @@ def run(args: argparse.Namespace) -> int:
         settings |= {"finder": "paper", "cutoff": args.cutoff or CUTOFF}
     if args.holes:
         settings["holes"] = True
+    if args.reviewed is not None:
+        settings["chosen"] = "by eye"
     write_library(args.output, entries, settings, rule)
     write_file(table, summary_text(pictures).encode(), rule)
     print("\n".join([format_errors(entries), *population_lines(entries)]))

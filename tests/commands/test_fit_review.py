@@ -11,7 +11,7 @@ from PIL import Image
 
 from flocsim.__main__ import main
 from flocsim.io.images.review import LARGEST
-from flocsim.io.shape_library import read_library
+from flocsim.io.shape_library import read_library, read_settings
 from tests.helpers.browser import open_page
 from tests.helpers.choices import choices_on, choose
 
@@ -96,7 +96,9 @@ def test_choices_are_where_they_were_when_the_page_is_made_again(folder, page):
 
 def test_no_choice_changes_nothing(folder, page):
     assert fit(folder, "--reviewed", choose(page)) == 0
-    assert (folder / "c.h5").read_bytes() == (folder / "s.h5").read_bytes()
+    assert (folder / "c.csv").read_bytes() == (folder / "s.csv").read_bytes()
+    before = read_settings(folder / "s.h5")
+    assert read_settings(folder / "c.h5") == before | {"chosen": "by eye"}
 
 
 def test_regions_can_be_added_where_the_filters_left_nothing(folder, capsys):
