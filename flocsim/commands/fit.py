@@ -9,6 +9,7 @@ from flocsim.commands import add_overwrite
 from flocsim.commands.fit_pictures import (
     draw_fits,
     draw_overlays,
+    draw_review,
     files_of,
     fit_pictures,
     list_pictures,
@@ -21,7 +22,7 @@ from flocsim.io.arguments import number, positive, several, whole
 from flocsim.io.files import make_folder, write_file
 from flocsim.io.fit_report import format_errors, plural, population_lines, summary_text
 from flocsim.io.images.paper import CUTOFF
-from flocsim.io.images.pictures import label_image, read_names
+from flocsim.io.images.pictures import label_image
 from flocsim.io.images.stacks import LARGEST_PIXEL, SMALLEST_PIXEL
 from flocsim.io.outputs import check_ending, check_outputs
 from flocsim.io.plots.style import FIGURE_ENDINGS
@@ -70,6 +71,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         the pixels that differ
     --masks-out FOLDER: write a label image of every picture, 0 outside and the number of each floc
         inside it (16-bit PNG), which can be edited and read back by --masks
+    --review: also write a page, shapes-review.html for shapes.h5, with all outlines over the
+        pictures, to choose flocs by eye; it saves the choices in a file for --reviewed
+    --reviewed FILE: fit the flocs that were chosen on the page of --review
     --memory GB: memory that a picture may take; larger ones are refused before the work begins
         (default: %(default)s)
     --finder: steepest: each floc is cut where its outline is steepest, against uneven light; paper:
@@ -92,10 +96,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     --neck SHARE: separate touching flocs at necks of up to this share of the smaller one's width;
         0: never (default: 0.5, only where the parts are so compact that they are surely two flocs,
         and never in a picture of fractal aggregates)
-    --drop LIST: flocs to leave out, by their numbers in the overlay and the table: 3,5 with one
-        picture, 023.png#3,5 with several
-    --keep LIST: fit only these regions, named as for --drop
-    --add LIST: also fit these regions, which would otherwise be left out
     """
     add = parser.add_argument
     add("images", nargs="+")
@@ -112,6 +112,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("-o", "--output", default="shapes.h5")
     for name in ("--overlay", "--fits", "--masks-out"):
         add(name)
+    add("--review", action="store_true")
+    add("--reviewed")
     add("--memory", type=lambda text: 1e9 * positive(text), default="1.3")
     add_overwrite(parser)
     add = parser.add_argument_group("finding flocs").add_argument
@@ -126,8 +128,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--max-radius", type=positive)
     add("--max-blur", type=number("a share, above 0", 5e-324, float("inf")), default="0.25")
     add("--neck", type=number("a share from 0 to 1", 0.0, 1.0))
-    for name in ("--drop", "--keep", "--add"):
-        add(name, type=read_names, default=())
 
 
 def length(text: str) -> float:
@@ -184,7 +184,6 @@ def run(args: argparse.Namespace) -> int:
     options = {name: getattr(args, name) for name in (OF_MASKS if args.masks else own)}
     # What is not given is as `segment`, or `segment_as_paper`, has it by default.
     args.segmentation = {name: each for name, each in options.items() if each is not None}
-    args.correction = {name: getattr(args, name) for name in ("drop", "keep", "add")}
     if args.overlay is not None:
         check_ending(args.overlay, FIGURE_ENDINGS)
     paths = list_pictures(args.images, args.masks)
@@ -193,7 +192,9 @@ def run(args: argparse.Namespace) -> int:
             make_folder(folder, f"--{option.replace('_', '-')} ")
     table, rule, titles = Path(args.output).with_suffix(".csv"), args.overwrite, titles_of(paths)
     overlays, labels = drawn_files(args, titles, len(paths) > 1)
-    check_outputs([args.output, table, *overlays, *labels], rule, paths)
+    pages = [table.with_name(f"{table.stem}-review.html")] if args.review else []
+    inputs = paths if args.reviewed is None else [*paths, args.reviewed]
+    check_outputs([args.output, table, *pages, *overlays, *labels], rule, inputs)
 
     pictures, lost = fit_pictures(paths, args)
     entries = [
@@ -201,6 +202,8 @@ def run(args: argparse.Namespace) -> int:
         for radius in args.radii for picture in pictures for region in picture.found.regions
     ]  # fmt: skip
     if not entries:
+        # Regions that the filters have left out can be added on the page.
+        draw_review(pages, pictures, args)
         problem = FlocsimError if lost else UsageError
         raise problem("nothing was fitted, no shape library was written")
     settings = {
@@ -214,6 +217,8 @@ def run(args: argparse.Namespace) -> int:
         settings |= {"finder": "paper", "cutoff": args.cutoff or CUTOFF}
     if args.holes:
         settings["holes"] = True
+    if args.reviewed is not None:
+        settings["chosen"] = "by eye"
     write_library(args.output, entries, settings, rule)
     write_file(table, summary_text(pictures).encode(), rule)
     print("\n".join([format_errors(entries), *population_lines(entries)]))
@@ -230,6 +235,7 @@ def run(args: argparse.Namespace) -> int:
         draw_overlays(overlays, pictures, args)
     if args.fits is not None:
         draw_fits(args.fits, pictures, rule)
+    draw_review(pages, pictures, args)
     if lost:
         raise FlocsimError(f"lost: {', '.join(lost)}; all else was written")
     return 0

@@ -6,6 +6,7 @@ import contextlib
 import os
 import sys
 import warnings
+import webbrowser
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -19,15 +20,25 @@ from flocsim.commands.processes import Lost, workers
 from flocsim.errors import FileError, FlocsimError, ImageError, ShapeError, UsageError
 from flocsim.geometry.fit.fit import Fit, fit_mask
 from flocsim.geometry.shapes.outline import ShapeMeasures
-from flocsim.io.files import Rule
+from flocsim.io.files import Rule, write_file
 from flocsim.io.fit_report import picture_line, plural
 from flocsim.io.images.background import FEWEST_FRAMES
 from flocsim.io.images.masks import ARRAYS, MASK_SUFFIXES, is_mask, read_masks, segment_mask
 from flocsim.io.images.paper import segment_as_paper
-from flocsim.io.images.pictures import Segmentation, check_names, corrected, segment, weighed
+from flocsim.io.images.pictures import Segmentation, segment, weighed
 from flocsim.io.images.reading import SUFFIXES, check_file, grey_of, read_grey, read_pixels
 from flocsim.io.images.regions import Region, mask_measures, with_holes
+from flocsim.io.images.review import (
+    Choices,
+    checksum_of,
+    choices_of,
+    chosen,
+    judged,
+    misfit,
+    read_choices,
+)
 from flocsim.io.images.stacks import Plane, pixel_size_in, planes_of, stack_of
+from flocsim.io.plots.review import review_page
 from flocsim.io.plots.shapes import draw_overlay, single_fit
 from flocsim.io.plots.style import save
 from flocsim.io.terminal import Progress
@@ -35,21 +46,32 @@ from flocsim.io.terminal import Progress
 Fits = dict[float, dict[int, Fit]]
 """The Fit of one mask at every spheroradius [px] and N."""
 
+Task = tuple[Path, str, np.ndarray | None, Namespace, dict[str, Choices] | None]
+"""A file of pictures, its title, the background, the options, and the choices made by eye."""
+
 MOST_FRAMES = 25
 """More frames than this tell hardly more about the light."""
+
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
+"""Variables of the environment that name a display."""
+
+FILE_OF_CHOICES = "reviewed.json"
+"""What the page calls the file that it saves."""
 
 
 @attrs.frozen(eq=False)
 class Picture:
     """One picture or mask, what was found in it, and the measures {label: ShapeMeasures} [px] of
-    its flocs; pixel_size [m]; plane: where it is in the file; fits {label: [Fits]} of the flocs,
-    of the mask and, if asked for, of both ends of its band."""
+    its flocs; pixel_size [m]; choices: which regions are flocs, and why; plane: where it is in the
+    file; fits {label: [Fits]} of the flocs, of the mask and, if asked for, of both ends of its
+    band."""
 
     path: Path
     name: str
     found: Segmentation
     measures: dict[int, ShapeMeasures]
     pixel_size: float
+    choices: Choices
     plane: Plane | None = None
     fits: dict[int, list[Fits]] = attrs.Factory(dict)
 
@@ -66,8 +88,12 @@ def fit_pictures(paths: Sequence[Path], options: Namespace) -> tuple[list[Pictur
     A file that cannot be read as a picture is reported and passed over. One that the machine has
     failed on, for want of memory or because a process was killed, is lost, with all its flocs.
     """
+    by_eye = None if options.reviewed is None else read_choices(options.reviewed)
     background = find_background(paths, options)
-    tasks = [(p, t, background, options) for p, t in zip(paths, titles_of(paths), strict=True)]
+    tasks = [
+        (path, title, background, options, by_eye)
+        for path, title in zip(paths, titles_of(paths), strict=True)
+    ]
     lost: dict[str, str] = {}
     pictures: list[Picture] = []
     with workers(options.jobs, compile_fit) as mapped:
@@ -88,7 +114,9 @@ def fit_pictures(paths: Sequence[Path], options: Namespace) -> tuple[list[Pictur
             pictures = [
                 attrs.evolve(each, found=one) for each, one in zip(pictures, found, strict=True)
             ]
-        check_names(options.correction, [(each.name, each.found) for each in pictures])
+        missing = sorted(set(by_eye or ()) - {each.name for each in pictures})
+        if missing and not lost:
+            raise misfit(options.reviewed, f"{missing[0]} is not among them")
         regions = [(each, region) for each in pictures for region in each.found.regions]
         masks = []
         for picture, region in regions:
@@ -147,21 +175,21 @@ def report(error: object) -> None:
     print(f"flocsim: {error}", file=sys.stderr, flush=True)
 
 
-def find_flocs(task: tuple[Path, str, np.ndarray | None, Namespace]) -> Any:
-    """Return the Pictures of (path, name, background, options), or the error of its file."""
-    path, name, background, options = task
+def find_flocs(task: Task) -> Any:
+    """Return the Pictures of a Task, or the error of its file."""
+    path, title, background, options, _ = task
+    picture = partial(picture_of, task, checksum_of(path))
     try:
         if options.masks:
             return [
-                picture_of(path, name + inner[len(path.name) :],
-                           segment_mask(mask, **options.segmentation), options)
+                picture(title + inner[len(path.name) :], segment_mask(mask, **options.segmentation))
                 for inner, mask in read_masks(path, options.memory)
-            ]  # fmt: skip
+            ]
         find: Any = partial(segment, background=background)
         if options.finder == "paper":
             find = segment_as_paper
         return [
-            picture_of(path, name + page, find(grey, **options.segmentation), options, plane)
+            picture(title + page, find(grey, **options.segmentation), plane)
             for page, plane, grey in pictures_in(path, options)
         ]
     except (ImageError, FileError) as error:
@@ -181,22 +209,26 @@ def pictures_in(path: Path, options: Namespace) -> Iterator[tuple[str, Plane, np
 
 
 def picture_of(
-    path: Path, name: str, found: Segmentation, options: Namespace, plane: Plane | None = None
+    task: Task, checksum: str, name: str, found: Segmentation, plane: Plane | None = None
 ) -> Picture:
-    """Return the Picture of a Segmentation, corrected as the user wants it."""
+    """Return the Picture of a Segmentation, with the flocs that were chosen by eye."""
+    path, _, _, options, by_eye = task
     size = options.pixel_size or pixel_size_in(path, stack_of(path))
     if size is None:
         raise UsageError(
             f"{path}: does not give the size of a pixel, as OME-TIFF and ImageJ files do; give the "
             "length of its side, for example --pixel-size '0.95 um'"
         )
-    found = corrected(name, found, options.correction)
+    choices = choices_of(name, checksum, found)
+    if by_eye is not None:
+        choices = judged(options.reviewed, choices, by_eye.get(name))
+    found = chosen(found, choices)
     if options.holes and found.holes is not None:
         opened = tuple(with_holes(each, found.holes) for each in found.regions)
         found = attrs.evolve(found, regions=opened)
     found = attrs.evolve(found, holes=None)
     measures = {region.label: mask_measures(region.mask) for region in found.regions}
-    return Picture(path, name, found, measures, size, plane)
+    return Picture(path, name, found, measures, size, choices, plane)
 
 
 def fit_region(task: tuple[str, Sequence[np.ndarray], Namespace]) -> list[Fits]:
@@ -273,7 +305,30 @@ def draw_overlays(paths: Sequence[Path], pictures: Sequence[Picture], options: N
         flocs = [(region, picture.finest(region)) for region in picture.found.regions]
         title = (f"{picture.name}: {plural(len(flocs), 'floc')}, N = {options.vertices[-1]}, "
                  f"r = {options.radii[0]:g} px")  # fmt: skip
-        grey = picture.found.foreground
-        if not options.masks:
-            grey = read_grey(picture.path, picture.plane or Plane(), options.memory)
-        save(draw_overlay(grey, flocs, title, picture.found.rejected), path, options.overwrite)
+        figure = draw_overlay(grey_in(picture, options), flocs, title, picture.found.rejected)
+        save(figure, path, options.overwrite)
+
+
+def draw_review(paths: Sequence[Path], pictures: Sequence[Picture], options: Namespace) -> None:
+    """Write the page on which flocs are chosen by eye, if there is to be one, and show it where
+    that is possible."""
+    for path in paths if pictures else []:
+        template = Path(__file__).with_name("templates") / "review.html"
+        greys = (grey_in(each, options) for each in pictures)
+        page = review_page(template.read_text("utf-8"), pictures, greys)
+        write_file(path, page.encode(), options.overwrite)
+        print(
+            f"{path}: choose flocs on it, save the choices, and run this command again with "
+            f"--reviewed {FILE_OF_CHOICES} --overwrite in the place of --review"
+        )
+        # Without a display a browser would take over the terminal.
+        has_display = sys.platform in ("darwin", "win32") or any(map(os.environ.get, DISPLAYS))
+        if has_display and sys.stdout.isatty():
+            webbrowser.open(path.resolve().as_uri())
+
+
+def grey_in(picture: Picture, options: Namespace) -> np.ndarray:
+    """Return what a picture is drawn from: its grey, or its mask."""
+    if options.masks:
+        return picture.found.foreground
+    return read_grey(picture.path, picture.plane or Plane(), options.memory)

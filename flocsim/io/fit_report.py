@@ -39,7 +39,7 @@ def picture_line(name: str, found: Segmentation) -> str:
     """Return a line on a picture's Segmentation: flocs, rejected regions by reason, foreground."""
     parts = [plural(len(found.regions), f"{found.flocs} floc")]
     if reasons := found.rejected_by_reason():
-        listed = (f"{count} {reason}" for reason, count in reasons.items())
+        listed = (f"{n} {reason.removeprefix('rejected ')}" for reason, n in reasons.items())
         parts.append(f"rejected {' and '.join(listed)}")
     if found.left_whole:
         parts.append(f"{found.left_whole} with necks not separated (--neck)")

@@ -12,6 +12,7 @@ from flocsim.__main__ import main
 from flocsim.commands import add_command, fit_pictures
 from flocsim.errors import FileError, ShapeError, UsageError
 from flocsim.io.shape_library import read_library, read_settings
+from tests.helpers.choices import choose
 
 
 def run(*arguments):
@@ -59,13 +60,13 @@ def test_pictures_become_a_library(tmp_path, frame, capsys):
 
 
 def test_a_pixel_size_with_its_unit(tmp_path, frame):
-    options = ("--vertices", "4", "--keep", "1", "-o", tmp_path / "s.h5")
+    options = ("--vertices", "4", "--min-radius", "12", "-o", tmp_path / "s.h5")
     assert run(frame, "--pixel-size", "0.95 um", *options) == 0
     assert [entry.pixel_size for entry in read_library(tmp_path / "s.h5")] == [0.95e-6]
 
 
 def test_a_doubtful_pixel_size_is_told_and_kept(tmp_path, frame, capsys):
-    options = ("--vertices", "4", "--keep", "1", "-o", tmp_path / "s.h5")
+    options = ("--vertices", "4", "--min-radius", "12", "-o", tmp_path / "s.h5")
     assert run(frame, "--pixel-size", "8.6 mm", *options) == 0
     [line] = capsys.readouterr().err.splitlines()
     assert line.startswith(
@@ -105,10 +106,10 @@ def test_pictures_of_one_name_stay_apart(tmp_path, frame):
 
 def test_the_summary_lists_every_region(tmp_path, frame):
     options = ("--pixel-size", "0.5e-6", "--vertices", "4,8", "-o", tmp_path / "s.h5")
-    assert run(frame, *options, "--min-radius", "6", "--drop", "2") == 0
+    assert run(frame, *options, "--min-radius", "6", "--max-radius", "16") == 0
     with open(tmp_path / "s.csv", newline="") as table:
         rows = list(csv.DictReader(table))
-    assert [row["left_out_because"] for row in rows] == ["", "dropped", "too small"]
+    assert [row["left_out_because"] for row in rows] == ["", "too large", "too small"]
     (entry,) = read_library(tmp_path / "s.h5")
     assert float(rows[0]["r_eq_m"]) == pytest.approx(0.5e-6 * entry.equivalent_radius, rel=1e-3)
     for name in ("perimeter", "aspect_ratio", "circularity", "solidity", "feret_max", "feret_min"):
@@ -224,7 +225,9 @@ def test_label_images_are_read_back_as_the_same_flocs(tmp_path, frame):
 
 def test_an_edited_label_image_counts_and_numbers_stay(tmp_path, frame):
     """One floc left, with another's number; a second one painted in."""
-    options = ("--keep", "3", "--masks-out", tmp_path / "labels")
+    assert run(frame, *QUICK, "--review", "-o", tmp_path / "all.h5") == 0
+    choices = choose(tmp_path / "all-review.html", {"a.png#1": "reject", "a.png#2": "reject"})
+    options = ("--reviewed", choices, "--masks-out", tmp_path / "labels")
     assert run(frame, *QUICK, *options, "-o", tmp_path / "s.h5") == 0
     assert list(flocs_of(tmp_path / "s.h5")) == ["a.png#3"]
     masks = (tmp_path / "labels", *QUICK, "--masks", "--overwrite", "-o", tmp_path / "m.h5")
@@ -238,31 +241,6 @@ def test_an_edited_label_image_counts_and_numbers_stay(tmp_path, frame):
     assert {k: v[0] for k, v in flocs_of(tmp_path / "m.h5").items() if k[-1] == "9"} == {
         "a.png#9": 600
     }
-
-
-def test_regions_are_dropped_kept_and_added_by_their_numbers(tmp_path, frame, capsys):
-    (frame / "b.png").write_bytes((frame / "a.png").read_bytes())
-    found = {}
-    for words in ("", "--drop b.png#1", "--keep a.png#2,b.png#1", "--add a.png#3 --drop a.png#1"):
-        small = ("--min-radius", "6", "--overwrite", "-o", tmp_path / "s.h5")
-        assert run(frame, *QUICK, *small, *words.split()) == 0
-        found[words] = [entry.floc_id for entry in read_library(tmp_path / "s.h5")]
-    assert list(found.values()) == [
-        ["a.png#1", "a.png#2", "b.png#1", "b.png#2"],
-        ["a.png#1", "a.png#2", "b.png#2"],
-        ["a.png#2", "b.png#1"],
-        ["a.png#2", "a.png#3", "b.png#1", "b.png#2"],
-    ]
-    with open(tmp_path / "s.csv", newline="") as table:
-        rows = {(r["picture"], r["floc"]): r["left_out_because"] for r in csv.DictReader(table)}
-    assert rows["a.png", "1"] == "dropped" and rows["a.png", "3"] == ""
-    assert rows["b.png", "3"] == "too small"
-    for words, told in {
-        "--drop 1": "--drop 1: there is no such region; write picture#number",
-        "--keep c.png#1": "--keep c.png#1: there is no", "--add a.png#9": "--add a.png#9: there is",
-    }.items():  # fmt: skip
-        with pytest.raises(UsageError, match=told):
-            run(frame, *QUICK, *words.split(), "--overwrite", "-o", tmp_path / "s.h5")
 
 
 def test_a_threshold_of_ones_own(tmp_path, frame, capsys):
@@ -388,7 +366,6 @@ def test_overlays_are_drawn(tmp_path, frame):
         ("--saturated", "1"),
         ("--threshold", "0"),
         ("--threshold", "1.5"),
-        ("--drop", "a"),
     ],
 )
 def test_wrong_values_are_named(frame, capsys, option, value):

@@ -1,5 +1,5 @@
 """Pictures → flocs: the image processing of the paper's section 2.1, made fit for uneven light;
-what a user corrects in it, and the weights that undo the filters.
+and the weights that undo the filters.
 
 A floc of h × w pixels is kept clear of the border at (H − h)(W − w) of the places where its picture
 of H × W could have shown it: each stands for HW/((H − h)(W − w)) (Miles and Lantuéjoul).
@@ -12,14 +12,12 @@ within its own.
 """
 
 import io
-import re
-from argparse import ArgumentTypeError
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 import attrs
 import numpy as np
 
-from flocsim.errors import ImageError, UsageError
+from flocsim.errors import ImageError
 from flocsim.io.images.background import (
     low_pass,
     robust_deviation,
@@ -56,17 +54,8 @@ COARSE = 4
 """Every fourth pixel tells whether flocs are dark or bright."""
 
 
-DROPPED = "dropped"
-NOT_CHOSEN = "not among those kept"
 MOST_LABEL = 65535
 """The largest number that a label image of 16 bits has."""
-
-Names = tuple[tuple[str | None, int], ...]
-"""(picture, number) of regions; None where only the number was given."""
-
-Correction = Mapping[str, Names]
-"""Regions by name: "drop" leaves flocs out, "keep", if any, all others, "add" takes regions in.
-Named as in the overlay and the table, "023.png#7", also if they were left out."""
 
 
 @attrs.frozen(eq=False)
@@ -267,65 +256,6 @@ def focus_weights(blur: np.ndarray, limit: np.ndarray) -> np.ndarray:
     softer = np.searchsorted(-blur[order], -limit, side="left")
     weights[known] = 1.0 / shares[softer]
     return weights
-
-
-def read_names(text: str) -> Names:
-    """Read the regions in a list such as "3,5", "023.png#7" or "023.png#7,9,024.png#2".
-
-    A bare number belongs to the picture named before it.  ArgumentTypeError for all else.
-    """
-    names: list[tuple[str | None, int]] = []
-    picture, begun = None, ""
-    for piece in text.split(","):
-        before, mark, number = (begun + piece).strip().rpartition("#")
-        if not re.fullmatch("[0-9]{1,9}", number):
-            begun += piece + ","  # a picture's name with a comma in it
-            continue
-        picture, begun = before if mark else picture, ""
-        names.append((picture, int(number)))
-    if begun:
-        raise ArgumentTypeError(
-            f"takes numbers or names of flocs, such as 3,5 or 023.png#7, found {text!r}"
-        )
-    return tuple(names)
-
-
-def check_names(correction: Correction, found: Sequence[tuple[str, Segmentation]]) -> None:
-    """UsageError for a name that none of the (picture's name, Segmentation) has, or several."""
-    known: set[tuple[str | None, int]] = {
-        (name, region.label) for name, each in found for region in (*each.regions, *each.rejected)
-    }
-    if len(found) == 1:
-        known |= {(None, label) for _, label in known}
-    for option, names in correction.items():
-        for picture, number in names:
-            if (picture, number) not in known:
-                name = number if picture is None else f"{picture}#{number}"
-                raise UsageError(
-                    f"--{option} {name}: there is no such region; write picture#number, as the "
-                    "table of all regions and the overlay have them"
-                )
-
-
-def corrected(picture: str, found: Segmentation, correction: Correction) -> Segmentation:
-    """The Segmentation with regions moved between flocs and those left out; numbers stay."""
-
-    def named(names):
-        return {number for name, number in names if name in (None, picture)}
-
-    drop, keep, add = (named(correction[key]) for key in ("drop", "keep", "add"))
-    regions: list[Region] = []
-    rejected: list[Region] = []
-    for each in (*found.regions, *found.rejected):
-        reason = each.reason
-        if each.label in drop:
-            reason = reason or DROPPED
-        elif each.label in (keep | add):
-            reason = ""
-        elif correction["keep"]:
-            reason = reason or NOT_CHOSEN
-        (rejected if reason else regions).append(attrs.evolve(each, reason=reason))
-    return attrs.evolve(found, regions=tuple(regions), rejected=tuple(rejected))
 
 
 def label_image(shape: tuple[int, int], regions: Iterable[Region], name: str = "") -> bytes:

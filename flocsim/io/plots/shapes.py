@@ -186,7 +186,7 @@ POPULATION_FIGURES: dict[str, Callable[[Sequence[ShapeEntry]], Figure]] = {
 FLOC_COLOUR = "#ff7f0e"
 REASON_COLOURS = {
     "out of focus": "#56b4e9", "at the border": "#f0e442", "too small": "#cc79a7",
-    "too large": "#00b894", "dropped": "#e84393", "not among those kept": "#b2bec3",
+    "too large": "#00b894", "rejected by eye": "#e84393",
 }  # fmt: skip
 OTHER_COLOUR = "#ffffff"
 DASHES = (0, (3, 1.5))
