@@ -218,9 +218,14 @@ class StudyKind:
         return f"{self.size} replicates: {words} x {replicates}"
 
     @property
+    def flocs_in_words(self) -> str:
+        """Return which flocs the study takes."""
+        return str(self.config.shapes.described(len(self.flocs)))
+
+    @property
     def source(self) -> dict[str, Any]:
         """Return the flocs, the preset and the version of flocsim, for `source_line`."""
-        found = self.config.shapes.described(len(self.flocs)), self.config.preset or ""
+        found = self.flocs_in_words, self.config.preset or ""
         return dict(zip(SOURCE, (*found, package_version("flocsim")), strict=True))
 
     @property

@@ -102,6 +102,12 @@ class Study(StudyKind):
         needed = any(n > 1 for n in config.shapes.vertices) or config.shapes.size == "own"
         return load_flocs(config.shapes, config.seed) if needed else []
 
+    @property
+    def flocs_in_words(self) -> str:
+        """Return which flocs are drawn."""
+        drawn = {floc for pairing in self.pairings for floc in pairing.drawn} if self.flocs else ()
+        return self.config.shapes.described(len(self.flocs), len(drawn))
+
     def doubts(self) -> list[str]:
         """Return lines on what is implausible in the study."""
         return study_warnings(self.config, self.flocs)

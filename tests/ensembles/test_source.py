@@ -5,21 +5,23 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
+from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import ShapesConfig
+from flocsim.ensembles.study import Study
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import add_foot, keep_titles_whole
 from flocsim.io.shape_library import SHIPPED
 from tests.helpers.small_study import run_command, write_small, write_star_library
 from tests.helpers.synthetic_results import make_results
 
-SOURCE = f"3 flocs of stars.h5 · preset tang2014 · flocsim {flocsim.__version__}"
+SOURCE = f"3 flocs of stars.h5, resized · preset tang2014 · flocsim {flocsim.__version__}"
 POOL = '3\nsource = "library"\nfile = "stars.h5"'
 
 
 @pytest.mark.parametrize(
     ("keys", "count", "words"),
     [
-        ({"source": "library", "file": "a/shapes.h5"}, 12, "12 flocs of shapes.h5"),
+        ({"source": "library", "file": "a/shapes.h5"}, 12, "12 flocs of shapes.h5, resized"),
         ({"source": "library", "file": SHIPPED}, 24, "24 synthetic flocs included in flocsim"),
         ({}, 10, "10 synthetic flocs grown by flocsim"),
         ({"vertices": (1,)}, 0, "spheres"),
@@ -29,6 +31,15 @@ POOL = '3\nsource = "library"\nfile = "stars.h5"'
 )  # fmt: skip
 def test_flocs_in_words(keys, count, words):
     assert ShapesConfig(**keys).described(count) == words
+
+
+def test_flocs_that_are_never_drawn_are_not_counted_as_used(in_tmp):
+    write_star_library(in_tmp / "stars.h5")
+    config = write_small(in_tmp, vertices="[4]", pool=POOL)
+    one = load_config(config, {"scene": {"types": ["I"]}, "shapes": {"pool": 1}})
+    # For each body the nearest floc in size is drawn, and no other.
+    assert Study(one).flocs_in_words == "2 of 3 flocs of stars.h5, resized"
+    assert Study(load_config(config)).flocs_in_words == "3 flocs of stars.h5, resized"
 
 
 def test_run_info_report_and_comparison_name_the_source(in_tmp, capsys):

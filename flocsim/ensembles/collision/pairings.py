@@ -44,6 +44,11 @@ class Pairing(abc.ABC):
         """Places of the flocs of i and j for a replicate's random numbers."""
 
     @property
+    @abc.abstractmethod
+    def drawn(self) -> set[int]:
+        """Indices of the flocs that `choose` may return."""
+
+    @property
     def fastest(self) -> tuple[float, float]:
         """r_i and r_j [m] of the pair that meets at the highest speed."""
         return self.spans[0][0], self.spans[1][1]
@@ -69,6 +74,10 @@ class TwoSizes(Pairing):
             return tuple((radius, radius) for radius in self.radii)  # type: ignore[return-value]
         sizes = self.pool.near(self.radii)
         return (sizes[0], sizes[-2]), (sizes[1], sizes[-1])
+
+    @property
+    def drawn(self) -> set[int]:
+        return {k for radius in self.radii for k in self.pool.by_size(radius)[: self.pool.pool]}
 
     def choose(self, numbers: Sequence[float] | np.ndarray) -> tuple[int, int]:
         return self.pool.choose(numbers, *self.radii)
@@ -102,6 +111,10 @@ class TwoClasses(Pairing):
         object.__setattr__(self, "radii", tuple(medians))
         spans = [(x[w > 0.0].min(), x[w > 0.0].max()) for x, w in zip(sizes, joint, strict=True)]
         object.__setattr__(self, "spans", tuple(tuple(map(float, each)) for each in spans))
+
+    @property
+    def drawn(self) -> set[int]:
+        return {*self.first.places.tolist(), *self.second.places.tolist()}
 
     def distribution(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """(sizes [m], weights) of bodies i and j over all pairs."""

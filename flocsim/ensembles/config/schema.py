@@ -181,15 +181,18 @@ class ShapesConfig:
         """The source, or the name of the user's own class."""
         return self.source or own_classes.full_name(self.own)
 
-    def described(self, count: int) -> str:
-        """Return which flocs a study takes; ``count`` of them, none where all are spheres."""
+    def described(self, count: int, drawn: int | None = None) -> str:
+        """Return which flocs a study takes; ``count`` of them, none where all are spheres, of which
+        so many are ``drawn``, all by default."""
         if self.own is not None or not count:
             return self.label if self.own is not None else "spheres"
         if self.file is None:
             return f"{count} synthetic flocs grown by flocsim"
         if Path(self.file) == SHIPPED:
             return f"{count} synthetic flocs included in flocsim"
-        return f"{count} flocs of {Path(self.file).name}"
+        some = f"{drawn} of " * (drawn is not None and drawn < count)
+        resized = ", resized" * (self.size == "scene")
+        return f"{some}{count} flocs of {Path(self.file).name}{resized}"
 
 
 @attrs.frozen
