@@ -1,13 +1,14 @@
-"""What the schemas say of config and results files, in docs/config.md and docs/results.md.
+"""Write the tables of docs/config.md and docs/results.md from the schemas.
 
-`python docs/schema_tables.py` makes those parts of both pages anew that stand between
-`<!-- of the schema: NAME -->` and `<!-- end -->`.
+This is a hook of mkdocs: each line `<!-- from the schema: NAME -->` of a page becomes the part of
+this name. `python docs/schema_tables.py config` prints the page as Markdown, with its tables.
 """
 
 import ast
 import inspect
 import itertools
 import re
+import sys
 import textwrap
 from collections.abc import Mapping
 from pathlib import Path
@@ -38,6 +39,9 @@ SCENE_HEADINGS = {
     **{f" of a {word}": SCENES[word] for word in SCENE_WORDS},
     " of a kernel study": SCENES["kernel"],
 }
+
+MARK = re.compile(r"<!-- from the schema: (.*) -->")
+"""A line that a part of the schema replaces."""
 
 QUOTED_WORD = re.compile(r"['\"]([^\W\d][\w-]*)['\"]")
 
@@ -161,21 +165,26 @@ def codes(name):
 
 
 def with_parts(page: str, parts: Mapping[str, str]) -> str:
-    """A page with its parts anew: what stands between ``<!-- of the schema: NAME -->`` and
-    ``<!-- end -->``. UsageError unless these are the parts that it has."""
-    found = re.findall(r"<!-- of the schema: (.*) -->", page)
+    """Return the page with its parts in the place of the lines ``<!-- from the schema: NAME -->``.
+
+    Raises UsageError unless the page asks for each of the parts once.
+    """
+    found = MARK.findall(page)
     if sorted(found) != sorted(parts):
         raise UsageError(f"a page of {', '.join(found)} has other parts than {', '.join(parts)}")
-    return re.sub(
-        r"(<!-- of the schema: (.*) -->\n\n)[\s\S]*?(\n<!-- end -->)",
-        lambda match: f"{match[1]}{parts[match[2]].strip()}\n{match[3]}", page,
-    )  # fmt: skip
+    return MARK.sub(lambda match: parts[match[1]].strip(), page)
 
 
 PAGES = {"config.md": config_parts, "results.md": results_parts}
 """Page → what makes its parts."""
 
+
+def on_page_markdown(markdown, page, **more):
+    """Fill in the tables of a page while mkdocs builds the site."""
+    made = PAGES.get(page.file.src_uri)
+    return with_parts(markdown, made()) if made else markdown
+
+
 if __name__ == "__main__":
-    for name, made in PAGES.items():
-        page = DOCS / name
-        page.write_text(with_parts(page.read_text("utf-8"), made()), "utf-8")
+    for name in sys.argv[1:] or ["config", "results"]:
+        print(with_parts((DOCS / f"{name}.md").read_text("utf-8"), PAGES[f"{name}.md"]()))
