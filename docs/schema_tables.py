@@ -1,9 +1,11 @@
-"""Write the tables of docs/config.md and docs/results.md from the schemas.
+"""Write the tables of docs/config.md and docs/results.md from the schemas, docs/commands.md from
+the parser.
 
 This is a hook of mkdocs: each line `<!-- from the schema: NAME -->` of a page becomes the part of
 this name. `python docs/schema_tables.py config` prints the page as Markdown, with its tables.
 """
 
+import argparse
 import ast
 import inspect
 import itertools
@@ -15,6 +17,7 @@ from pathlib import Path
 
 import attrs
 
+from flocsim.__main__ import make_parser
 from flocsim.ensembles.config import SCENE_WORDS
 from flocsim.ensembles.config.schema import FORCES, SCENES, STUDY_KEYS, TABLES, Config, keys_of
 from flocsim.errors import UsageError
@@ -164,6 +167,22 @@ def codes(name):
     return ": " + ", ".join(f"{value} {word}" for value, word in zip(*FLAGS[name], strict=True))
 
 
+def command_parts() -> dict[str, str]:
+    """Return {"commands": the help of every command} for docs/commands.md."""
+    return {"commands": "\n\n".join(helps(make_parser()))}
+
+
+def helps(parser):
+    """Yield heading and help of every command below a parser, those with commands of their own
+    left out."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from helps(command)
+            return
+    yield f"## {parser.prog}\n\n```text\n{parser.format_help()}```"
+
+
 def with_parts(page: str, parts: Mapping[str, str]) -> str:
     """Return the page with its parts in the place of the lines ``<!-- from the schema: NAME -->``.
 
@@ -175,7 +194,7 @@ def with_parts(page: str, parts: Mapping[str, str]) -> str:
     return MARK.sub(lambda match: parts[match[1]].strip(), page)
 
 
-PAGES = {"config.md": config_parts, "results.md": results_parts}
+PAGES = {"config.md": config_parts, "results.md": results_parts, "commands.md": command_parts}
 """Page → what makes its parts."""
 
 
@@ -186,5 +205,5 @@ def on_page_markdown(markdown, page, **more):
 
 
 if __name__ == "__main__":
-    for name in sys.argv[1:] or ["config", "results"]:
+    for name in sys.argv[1:] or ["config", "results", "commands"]:
         print(with_parts((DOCS / f"{name}.md").read_text("utf-8"), PAGES[f"{name}.md"]()))

@@ -1,4 +1,4 @@
-"""docs/config.md and docs/results.md say what the schemas do."""
+"""docs/config.md, results.md and commands.md say what the schemas and the parser do."""
 
 import importlib.util
 import tomllib
@@ -21,7 +21,7 @@ def tables():
     return module
 
 
-@pytest.mark.parametrize("name", ["config.md", "results.md"])
+@pytest.mark.parametrize("name", ["config.md", "results.md", "commands.md"])
 def test_the_pages_get_all_parts_of_the_schema(tables, name):
     page = (ROOT / "docs" / name).read_text("utf-8")
     parts = tables.PAGES[name]()
