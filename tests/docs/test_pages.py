@@ -28,6 +28,7 @@ OTHER_PROGRAMS = ("python3 run.py", "python3 -m venv", ".venv/bin/", "srun ", "p
 """Commands that install flocsim, need a cluster, or are scripts with tests of their own."""
 
 NOT_RUN = {
+    "docs/check.md": "minutes, on a study that is the reader's",
     "docs/cluster.md": "one study, started in four ways, three of which need a machine for them",
     "docs/kernels.md": "1,024 points of each pair of classes: many minutes",
     "docs/presets.md": "a sweep of a study that is the reader's",
