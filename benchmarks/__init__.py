@@ -1,7 +1,7 @@
 """How fast, how exact and how robust flocsim is, measured; not installed with it.
 
 Run from the folder of the repository: `python -m benchmarks.speed.throughput`, `--help` for its
-options. `refresh` puts the tables into docs/. They may use flocsim, tests.reference and
+options. `refresh` puts the tables into docs/evidence/. They may use flocsim, tests.reference and
 tests.helpers.
 """
 

@@ -1,4 +1,4 @@
-"""Run the benchmarks and put their tables into the pages of docs/, each between its marks.
+"""Run the benchmarks and put their tables into the pages of docs/evidence/, each between its marks.
 
     python -m benchmarks.refresh [--only NAME …] [--quick]
 
@@ -13,7 +13,7 @@ import sys
 
 from benchmarks.reporting import ROOT
 
-PAGES = [ROOT / "docs" / f"{name}.md" for name in ("benchmarks", "cluster")]
+PAGES = sorted((ROOT / "docs" / "evidence").glob("*.md"))
 BLOCK = re.compile(r"(<!-- (\w+): (python [^>]*?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 

@@ -54,7 +54,7 @@ def begin(description, *arguments, packages=(), used="one used", **options):
     """
     parser = argparse.ArgumentParser(description=description.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="less of it, within a minute or so")
-    parser.add_argument("--markdown", action="store_true", help="print the tables for docs/")
+    parser.add_argument("--markdown", action="store_true", help="print the tables for the pages")
     for name, about in arguments:
         parser.add_argument(name, **about)
     for name, default in options.items():

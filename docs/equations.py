@@ -18,4 +18,4 @@ def on_config(config):
 def formula(source, language, css_class, options, md, **more):
     """The MathML of LaTeX, which scrolls by itself where a screen is narrow."""
     mathml = convert(source, display="block")
-    return f'<div class="{css_class}" style="overflow-x: auto">{mathml}</div>'
+    return f'<div class="{css_class}" style="overflow: auto hidden">{mathml}</div>'

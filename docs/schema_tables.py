@@ -1,19 +1,23 @@
-"""What the schemas say of config and results files, in docs/config.md and docs/results.md.
+"""Write the tables of docs/config.md and docs/results.md from the schemas, docs/commands.md from
+the parser.
 
-`python docs/schema_tables.py` makes those parts of both pages anew that stand between
-`<!-- of the schema: NAME -->` and `<!-- end -->`.
+This is a hook of mkdocs: each line `<!-- from the schema: NAME -->` of a page becomes the part of
+this name. `python docs/schema_tables.py config` prints the page as Markdown, with its tables.
 """
 
+import argparse
 import ast
 import inspect
 import itertools
 import re
+import sys
 import textwrap
 from collections.abc import Mapping
 from pathlib import Path
 
 import attrs
 
+from flocsim.__main__ import make_parser
 from flocsim.ensembles.config import SCENE_WORDS
 from flocsim.ensembles.config.schema import FORCES, SCENES, STUDY_KEYS, TABLES, Config, keys_of
 from flocsim.errors import UsageError
@@ -38,6 +42,9 @@ SCENE_HEADINGS = {
     **{f" of a {word}": SCENES[word] for word in SCENE_WORDS},
     " of a kernel study": SCENES["kernel"],
 }
+
+MARK = re.compile(r"<!-- from the schema: (.*) -->")
+"""A line that a part of the schema replaces."""
 
 QUOTED_WORD = re.compile(r"['\"]([^\W\d][\w-]*)['\"]")
 
@@ -160,22 +167,43 @@ def codes(name):
     return ": " + ", ".join(f"{value} {word}" for value, word in zip(*FLAGS[name], strict=True))
 
 
+def command_parts() -> dict[str, str]:
+    """Return {"commands": the help of every command} for docs/commands.md."""
+    return {"commands": "\n\n".join(helps(make_parser()))}
+
+
+def helps(parser):
+    """Yield heading and help of every command below a parser, those with commands of their own
+    left out."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from helps(command)
+            return
+    yield f"## {parser.prog}\n\n```text\n{parser.format_help()}```"
+
+
 def with_parts(page: str, parts: Mapping[str, str]) -> str:
-    """A page with its parts anew: what stands between ``<!-- of the schema: NAME -->`` and
-    ``<!-- end -->``. UsageError unless these are the parts that it has."""
-    found = re.findall(r"<!-- of the schema: (.*) -->", page)
+    """Return the page with its parts in the place of the lines ``<!-- from the schema: NAME -->``.
+
+    Raises UsageError unless the page asks for each of the parts once.
+    """
+    found = MARK.findall(page)
     if sorted(found) != sorted(parts):
         raise UsageError(f"a page of {', '.join(found)} has other parts than {', '.join(parts)}")
-    return re.sub(
-        r"(<!-- of the schema: (.*) -->\n\n)[\s\S]*?(\n<!-- end -->)",
-        lambda match: f"{match[1]}{parts[match[2]].strip()}\n{match[3]}", page,
-    )  # fmt: skip
+    return MARK.sub(lambda match: parts[match[1]].strip(), page)
 
 
-PAGES = {"config.md": config_parts, "results.md": results_parts}
+PAGES = {"config.md": config_parts, "results.md": results_parts, "commands.md": command_parts}
 """Page → what makes its parts."""
 
+
+def on_page_markdown(markdown, page, **more):
+    """Fill in the tables of a page while mkdocs builds the site."""
+    made = PAGES.get(page.file.src_uri)
+    return with_parts(markdown, made()) if made else markdown
+
+
 if __name__ == "__main__":
-    for name, made in PAGES.items():
-        page = DOCS / name
-        page.write_text(with_parts(page.read_text("utf-8"), made()), "utf-8")
+    for name in sys.argv[1:] or ["config", "results", "commands"]:
+        print(with_parts((DOCS / f"{name}.md").read_text("utf-8"), PAGES[f"{name}.md"]()))

@@ -1,10 +1,10 @@
-"""Put the numbers and figures of a finished study into docs/reproduction.md.
+"""Put the numbers and figures of a finished study into docs/evidence/reproduction.md.
 
     python examples/tang2014/fill_page.py [--draw] DIR
 
 Every part ``<!-- name -->`` … ``<!-- end -->`` of the page is replaced by that of the same name in
 DIR's summary.md, sensitivity.md or plateau.md; parts without one stay. Figures that the page shows,
-figures/tang2014-NAME, are copied from DIR/NAME. The words around them are for a person to check.
+../figures/tang2014-NAME, are copied from DIR/NAME. The words around them are for a person to check.
 --draw first makes summary.md and the figures anew from the results in DIR, running nothing.
 """
 
@@ -16,10 +16,10 @@ from pathlib import Path
 
 import reproduce
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "reproduction.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "evidence" / "reproduction.md"
 SOURCES = ("summary.md", "sensitivity.md", "plateau.md")
 PART = re.compile(r"<!-- ([a-z-]+) -->\n.*?<!-- end -->", re.DOTALL)
-FIGURE = re.compile(r"\(figures/tang2014-([\w.-]+)\)")
+FIGURE = re.compile(r"\(\.\./figures/tang2014-([\w.-]+)\)")
 
 
 def parts_of(folder):
@@ -70,7 +70,7 @@ def main():
     wanted = [match[1] for match in PART.finditer(text)]
     print("filled:", ", ".join(name for name in wanted if name in parts))
     print("as before:", ", ".join(name for name in wanted if name not in parts))
-    print("copied:", ", ".join(copy_figures(text, folder, PAGE.parent / "figures")))
+    print("copied:", ", ".join(copy_figures(text, folder, PAGE.parents[1] / "figures")))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""summary.md: all the numbers of a finished study that docs/reproduction.md shows."""
+"""summary.md: all the numbers of a finished study that docs/evidence/reproduction.md shows."""
 
 import attrs
 import numpy as np
@@ -24,7 +24,7 @@ BESIDE = {"pr_inside": "Pr[C inside]", "pr_a_inside": "Pr[A|inside]",
 
 
 def write_summary(folder, study, changes, findings, readings, zones):
-    """Write the page: each part stands between marks, as in docs/reproduction.md.
+    """Write the page: each part stands between marks, as in docs/evidence/reproduction.md.
 
     ``findings``: of all claims; ``readings``: {name: (Results, Findings about collisions)};
     ``zones``: {type: D_0 [m]}.

@@ -21,18 +21,23 @@ from flocsim.errors import PlausibilityWarning
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
-PAGES = ["README.md", *sorted(f"docs/{path.name}" for path in ROOT.glob("docs/*.md"))]
+FOUND = [*ROOT.glob("docs/*.md"), *ROOT.glob("docs/evidence/*.md")]
+PAGES = ["README.md", *sorted(path.relative_to(ROOT).as_posix() for path in FOUND)]
 
 OTHER_PROGRAMS = ("python3 run.py", "python3 -m venv", ".venv/bin/", "srun ", "python ")
 """Commands that install flocsim, need a cluster, or are scripts with tests of their own."""
 
 NOT_RUN = {
+    "docs/check.md": "minutes, on a study that is the reader's",
     "docs/cluster.md": "one study, started in four ways, three of which need a machine for them",
     "docs/kernels.md": "1,024 points of each pair of classes: many minutes",
     "docs/presets.md": "a sweep of a study that is the reader's",
-    "docs/real_flocs.md": "minutes to hours, on pictures that are not in the repository",
-    "docs/reproduction.md": "hours",
-    "docs/strength.md": "8.5 min of CPU time, on a study that is the reader's",
+    "docs/evidence/accuracy.md": "benchmarks: minutes to hours",
+    "docs/evidence/kernels.md": "a quarter of an hour",
+    "docs/evidence/real_flocs.md": "minutes to hours, on pictures that are not in the repository",
+    "docs/evidence/reproduction.md": "hours",
+    "docs/evidence/strength.md": "8.5 min of CPU time, on a study that is the reader's",
+    "docs/strength.md": "minutes, on a study that is the reader's",
     "docs/tutorial.md": "run as a notebook by test_tutorial.py",
 }
 """Pages whose commands are parsed only, and why."""

@@ -54,4 +54,4 @@ def test_every_part_of_the_page_has_a_writer(example):
     for match in page.PART.finditer(text):
         assert f'"{match[1]}"' in written or f"<!-- {match[1]} -->" in written
     for name in page.FIGURE.findall(text):
-        assert (page.PAGE.parent / "figures" / f"tang2014-{name}").exists()
+        assert (page.PAGE.parents[1] / "figures" / f"tang2014-{name}").exists()

@@ -2,10 +2,11 @@
 
 To add a key, add an attribute here, and nothing else: its name is the key, its field
 (flocsim.fields) has type, unit, range and default, and the text below it says what it means. The
-loader reads it, its messages name it, `--set` sets it, and `python docs/schema_tables.py` writes it
-into docs/config.md. A new table is a class here and an attribute of Config. [scene] has a class for
-each kind of it, SCENES. Keys that exclude each other stand in EXCLUSIVE, those that follow from the
-water in FOLLOWING; what is checked between tables, in ``problems`` of the scene.
+loader reads it, its messages name it, `--set` sets it, and docs/schema_tables.py puts it into
+docs/config.md when the site is built. A new table is a class here and an attribute of Config.
+[scene] has a class for each kind of it, SCENES. Keys that exclude each other stand in EXCLUSIVE,
+those that follow from the water in FOLLOWING; what is checked between tables, in ``problems`` of
+the scene.
 
 Metadata of this schema alone: ``only_for`` says with which other key a key applies, ``usual`` is
 what a default that depends on other keys is mostly; ``beside_class`` marks keys that stay where a
