@@ -31,7 +31,7 @@ def test_buoyancy_takes_off_the_displaced_fluid():
     wet = body.buoyant_mass(Fluid(density=997.0, buoyancy=True))
     assert wet == pytest.approx(body.mass * (1 - 997.0 / 2650.0), rel=1e-15)
     assert Body(BALL, density=900.0).buoyant_mass(Fluid(buoyancy=True)) < 0.0
-    with pytest.raises(UsageError, match=r"buoyancy needs the bodies' density"):
+    with pytest.raises(UsageError, match=r"buoyancy needs the density of the bodies"):
         Body(BALL, surface_density=2.0).buoyant_mass(Fluid(buoyancy=True))
 
 
@@ -61,7 +61,7 @@ def test_what_is_no_body_is_refused_in_one_line(case):
 
 
 def test_a_shape_must_be_a_shape():
-    with pytest.raises(UsageError, match=r"Sphere or a SpheroPolygon, or .*, found 'ball'"):
+    with pytest.raises(UsageError, match=r"Sphere, a SpheroPolygon, or .*, found 'ball'"):
         Body("ball", density=1.0)
 
 

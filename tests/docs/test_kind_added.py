@@ -91,8 +91,11 @@ def test_its_files_are_shown(home, words, told):
 @pytest.mark.parametrize(
     ("words", "why"),
     [
-        ("compare a.h5 a.h5", "holds a flocsim lone: name a file of flocsim results or"),
-        ("export matrix a.h5", "holds a flocsim lone: name a file with results"),
+        (
+            "compare a.h5 a.h5",
+            ": name a file with results of a collision ensemble or",
+        ),
+        ("export matrix a.h5", 'is a "flocsim lone" file: name a file with results'),
         ("plot a.h5 --animation a.gif", "--animation is for results of a swarm study"),
         ("kernel s.toml", 's.toml has scene.kind = "lone"'),
     ],
