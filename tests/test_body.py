@@ -36,8 +36,8 @@ def test_buoyancy_takes_off_the_displaced_fluid():
 
 
 WRONG_BODIES = {
-    "no mass": ({}, "either surface_density .* or density"),
-    "two masses": ({"surface_density": 2.0, "density": 2650.0}, "not both"),
+    "no mass": ({}, "one of surface_density .* and density .*, found neither"),
+    "two masses": ({"surface_density": 2.0, "density": 2650.0}, "found both"),
     "no surface density": ({"surface_density": 0.0}, "surface_density must be .* above 0"),
     "a density of nan": ({"density": float("nan")}, "density must be"),
     "a density of another kind": ({"density": "2650 kg/m^2"}, "density must be a density such as"),
