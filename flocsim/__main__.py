@@ -25,7 +25,8 @@ def make_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     the others need not be loaded for it; of all commands without words."""
     parser = Parser(
         prog="flocsim",
-        description="When two flocs of real shape meet in water: do they collide, do they stick?",
+        description="When two flocs of real shape meet in water, do they collide, and do they "
+        "stick?",
     )
     parser.add_argument("--version", action="version", version=f"flocsim {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -51,8 +52,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             if (launched_size() or 0) > 1:
                 print(
                     f"flocsim: {arguments.command} runs on one rank only, and the other ranks of "
-                    "this job have ended: start it without mpirun or srun, with --jobs where it "
-                    "takes that",
+                    "this job have ended: start it without mpirun or srun, and use --jobs if it "
+                    "has that option",
                     file=sys.stderr,
                 )
                 if arguments.command == "sweep" and not arguments.dry_run:

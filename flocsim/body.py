@@ -104,23 +104,23 @@ class Fluid:
 
     temperature: float | None = quantity(
         "K", at_least=water.ZERO_CELSIUS, at_most=water.ZERO_CELSIUS + 40.0, default=None,
-        help='of the water, "15 degC"; 25 °C where only its salt is given', kw_only=True,
+        help='of the water, as "15 degC"; 25 °C if only the salt is given', kw_only=True,
     )  # fmt: skip
     salinity: float | None = quantity(
         "g/kg", at_least=0.0, at_most=42.0, default=None,
-        help="of sea water, or of such with fresh water in it; the ocean has 35 g/kg", kw_only=True,
+        help="of sea water, pure or diluted; the ocean has 35 g/kg", kw_only=True,
     )  # fmt: skip
     ionic_strength: float | None = quantity(
         "mol/m^3", above=0.0, at_most=1000.0, default=None,
-        help="I of a salt other than that of the sea, instead of `salinity`", kw_only=True,
+        help="ionic strength I of another salt, instead of `salinity`", kw_only=True,
     )  # fmt: skip
     viscosity: float = quantity(
-        "Pa s", above=0.0, help="γ; by default that of the water, where it is given",
+        "Pa s", above=0.0, help="γ; follows from temperature and salt, if they are given",
         default=attrs.Factory(lambda self: self.of_water(water.viscosity, WATER_VISCOSITY), True),
         shown=f"{WATER_VISCOSITY}",
     )  # fmt: skip
     density: float = quantity(
-        "kg/m^3", at_least=0.0, help="ρ_f; by default that of the water, where it is given",
+        "kg/m^3", at_least=0.0, help="ρ_f; follows from temperature and salt, if they are given",
         default=attrs.Factory(lambda self: self.of_water(water.density, WATER_DENSITY), True),
         shown=f"{WATER_DENSITY}",
     )  # fmt: skip
@@ -137,8 +137,8 @@ class Fluid:
     def __attrs_post_init__(self) -> None:
         if self.salinity is not None and self.ionic_strength is not None:
             raise UsageError(
-                "salinity gives the ionic strength, and ionic_strength is given too: remove one of "
-                "them"
+                "salinity determines the ionic strength, but ionic_strength is given too: remove "
+                "one of them"
             )
 
     def of_water(self, law: Callable[[float, float], float], otherwise: float) -> float:
@@ -272,7 +272,7 @@ class Body:
     """
 
     shape: Shape = attrs.field(
-        validator=only(Shape, "shape must be a Sphere or a SpheroPolygon, or a Shape of your own")
+        validator=only(Shape, "shape must be a Sphere, a SpheroPolygon, or a Shape of your own")
     )
     position: tuple[float, float] = attrs.field(default=(0.0, 0.0), converter=read_position)
     angle: float = quantity("rad", default=0.0)
@@ -286,8 +286,8 @@ class Body:
     def __attrs_post_init__(self) -> None:
         if (self.surface_density is None) == (self.density is None):
             raise UsageError(
-                "a body needs either surface_density [kg/m^2] or density [kg/m^3], not both: "
-                f"found surface_density={self.surface_density}, density={self.density}"
+                "a body needs one of surface_density [kg/m^2] and density [kg/m^3], found "
+                f"{'neither' if self.density is None else 'both'}"
             )
 
     @property
@@ -320,8 +320,8 @@ class Body:
             return self.mass
         if self.density is None:
             raise UsageError(
-                "buoyancy needs the bodies' density [kg/m^3], but only surface_density is given: "
-                "set bodies.density and bodies.depth, or fluid.buoyancy = false"
+                "buoyancy needs the density of the bodies [kg/m^3], but only surface_density is "
+                "given: set bodies.density and bodies.depth, or fluid.buoyancy = false"
             )
         return self.mass * (1.0 - fluid.density / self.density)
 

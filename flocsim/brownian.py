@@ -68,7 +68,7 @@ def repulsion(
     """
     along = [f for f in forces if isinstance(f, PairForce) and needs_both_shapes(f)]
     refuse_outlines(
-        [force for force in along if force.acts_on != "outlines"], "a meeting of two spheres"
+        [force for force in along if force.acts_on != "outlines"], "an encounter of two spheres"
     )
     if along:
         return repulsion_of_circles(
@@ -257,9 +257,9 @@ def brownian_meetings(
     that keeps them apart at any angle, and an escape further away.
     """
     if len(bodies) != 2:
-        raise UsageError(f"a meeting is one of two bodies, found {len(bodies)}")
+        raise UsageError(f"a Brownian encounter needs two bodies, found {len(bodies)}")
     if not thermal_forces(forces):
-        raise UsageError("a brownian meeting needs a Thermal force of a temperature above 0 K")
+        raise UsageError("a Brownian encounter needs a Thermal force with temperature above 0 K")
     check_whole(replicates, 1, "replicates")
     near, far = above_zero(release, "m", "release"), above_zero(escape, "m", "escape")
     touch = sum(body.shape.bounding_radius for body in bodies)

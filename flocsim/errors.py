@@ -81,6 +81,11 @@ LONGEST_SHOWN = 60
 """Characters of a word or value in a message."""
 
 
+def plural(count: int, noun: str, many: str = "") -> str:
+    """Return "1 floc", "2 flocs"; ``many``: a plural that has more than an s."""
+    return f"{count} {noun if count == 1 else many or f'{noun}s'}"
+
+
 def closest(word: str, words: Iterable[str]) -> str:
     """Return the one of the words that is nearest to a misspelt one; "" where none is close."""
     near = difflib.get_close_matches(word, words, n=1) if len(word) <= LONGEST_SHOWN else []

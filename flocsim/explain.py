@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from flocsim.errors import plural
 from flocsim.forces import check
 from flocsim.forces.base import BodyForce, ContactForce, force_names
 from flocsim.forces.outline import charge_layer
@@ -53,11 +54,11 @@ def heading(system):
     bodies = system.bodies
     sizes = sorted({len(body.shape.vertices) for body in bodies})
     kind = "spheres only" if system.spheres_only else "polygons"
-    noun = "body" if len(bodies) == 1 else "bodies"
+
     points = " to ".join(map(str, sizes[:: max(len(sizes) - 1, 1)]))
     fixed = sum(body.fixed for body in bodies)
     held = f", {fixed} of them fixed" if fixed else ""
-    count = f"{len(bodies)} {noun}, {kind} (core points: {points}){held}"
+    count = f"{plural(len(bodies), 'body', 'bodies')}, {kind} (core points: {points}){held}"
     return f"{count}; method {system.integrator}"
 
 
@@ -68,7 +69,7 @@ def force_lines(system):
         f"in:  {force}: {'; '.join(about(system, force))}" for _, force in named if not force.absent
     ]
     lines += [f"out: {name}: {force.absent}" for name, force in named if force.absent]
-    return lines or ["out: forces: none are given, bodies move freely"]
+    return lines or ["out: forces: none are given, so bodies move freely"]
 
 
 def about(system, force):
@@ -85,12 +86,12 @@ def about(system, force):
         centres, reach = force.acts_on == "centres", force.reach
         place = "along the line of centres" if centres else "between the outlines"
         if force.acts_on == "orientations":
-            place = "by the distance of centres and how both bodies are turned"
+            place = "depends on the distance of the centres and the angles of both bodies"
         elif force.acts_on == "outlines":
-            place = "all along the outlines"
+            place = "integrated along the outlines"
             shapes = [body.shape for body in system.bodies]
             if charge_layer([force], shapes) is not None:
-                place += ", between charges behind them, for it is thick beside their corners"
+                place += ", between charges inside them, as the layer is thicker than the corners"
                 if force.boundary == "superposition":
                     reach = system.pieces.layer[2]
         far = f"not called at gaps above {reach:.3g} m" if reach < math.inf else "at every gap"
@@ -114,7 +115,7 @@ def sliding(system, force):
     if force.slip_limit is None:
         return "no sliding"
     limits = tried(system, force, force.slip_limit, check.SAMPLE_CONTACTS)
-    return "slides at its limit" if min(limits) < math.inf else "no sliding: its limit is infinite"
+    return "slides at its limit" if min(limits) < math.inf else "no sliding: infinite friction"
 
 
 def tried(system, force, kernel, views):
@@ -127,7 +128,7 @@ def scale_lines(system):
     """Return lines on time scales, how many are stiff, and the step of an explicit method."""
     scales = {name: time for name, time in all_scales(system).items() if 0.0 < time < math.inf}
     if not scales:
-        return ["time scales: none, as nothing restores or damps the motion"]
+        return ["time scales: none, because no force restores or damps the motion"]
     slowest = max(scales.values())
     stiff = sum(slowest > STIFF * time for time in scales.values())
     words = ", ".join(f"{name} {time:.2g} s" for name, time in scales.items())
@@ -139,7 +140,7 @@ def scale_lines(system):
     step = STABLE * min(limits)
     return [
         head,
-        f"an explicit method: unstable with steps of more than about {step:.2g} s, "
+        f"an explicit method would be unstable with steps above about {step:.2g} s: "
         f"{slowest / step:.2g} steps for the slowest scale",
     ]
 

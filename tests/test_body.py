@@ -31,13 +31,13 @@ def test_buoyancy_takes_off_the_displaced_fluid():
     wet = body.buoyant_mass(Fluid(density=997.0, buoyancy=True))
     assert wet == pytest.approx(body.mass * (1 - 997.0 / 2650.0), rel=1e-15)
     assert Body(BALL, density=900.0).buoyant_mass(Fluid(buoyancy=True)) < 0.0
-    with pytest.raises(UsageError, match=r"buoyancy needs the bodies' density"):
+    with pytest.raises(UsageError, match=r"buoyancy needs the density of the bodies"):
         Body(BALL, surface_density=2.0).buoyant_mass(Fluid(buoyancy=True))
 
 
 WRONG_BODIES = {
-    "no mass": ({}, "either surface_density .* or density"),
-    "two masses": ({"surface_density": 2.0, "density": 2650.0}, "not both"),
+    "no mass": ({}, "one of surface_density .* and density .*, found neither"),
+    "two masses": ({"surface_density": 2.0, "density": 2650.0}, "found both"),
     "no surface density": ({"surface_density": 0.0}, "surface_density must be .* above 0"),
     "a density of nan": ({"density": float("nan")}, "density must be"),
     "a density of another kind": ({"density": "2650 kg/m^2"}, "density must be a density such as"),
@@ -61,7 +61,7 @@ def test_what_is_no_body_is_refused_in_one_line(case):
 
 
 def test_a_shape_must_be_a_shape():
-    with pytest.raises(UsageError, match=r"Sphere or a SpheroPolygon, or .*, found 'ball'"):
+    with pytest.raises(UsageError, match=r"Sphere, a SpheroPolygon, or .*, found 'ball'"):
         Body("ball", density=1.0)
 
 

@@ -87,6 +87,6 @@ def test_the_step_that_an_explicit_method_needs(share, grows):
     """Below the named step a vibrating pair stays as it is, above it it explodes."""
     bodies, force = head_on(1e-6, 1e-9), Spring(stiffness=20.0)
     text = System(bodies, [force]).explain()
-    step = share * float(re.search(r"steps of more than about (\S+) s", text)[1])
+    step = share * float(re.search(r"steps above about (\S+) s", text)[1])
     end = System(bodies, [force], VelocityVerlet(step)).run(30.0 * step, jit=False)
     assert (not abs(end.velocity[:, :, 0]).max() < 1e-2) == grows

@@ -23,20 +23,19 @@ SUMMARIES = {
     "init": "write an example config file",
     "fit": "fit spheropolygons to the flocs in pictures",
     "shapes": "list, select and merge the flocs of shape libraries",
-    "check": "check a study's scene at the extremes of its sizes and tolerance",
+    "check": "check the numerical error of a study at the extremes of its sizes and tolerance",
     "ensemble": "run the ensemble of a config file",
-    "kernel": 'compute rates of encounters by size classes (scene.kind = "kernel"): collision '
-    "kernels and efficiencies for population balances",
+    "kernel": "compute collision kernels and efficiencies of size classes for population balances "
+    '(scene.kind = "kernel")',
     "swarm": 'run a study of many bodies (scene.kind = "swarm"), as ensemble does',
     "sweep": "run a study at several values of a key",
     "trajectory": "run one replicate of a config and draw it as a strip of frames",
     "plot": "draw the figures of a results file or a shape library",
     "report": "write one HTML page about a file",
-    "export": "write tables, motion or rates of encounters for other programs",
+    "export": "write tables, motion or collision kernels for other programs",
     "compare": "compare two results files: differences of probabilities with 95 %% intervals",
     "strength": "find the rate at which a flow opens the bonds of a study",
-    "work-precision": "flips and errors against CPU time, for the methods and tolerances of a "
-    "config",
+    "work-precision": "measure flips, errors and CPU time of a config at many tolerances",
     "info": "describe a results file, a running study, a library, a trajectory or a sweep",
 }
 """{command: what it does}, in the order of the help, which needs no more of them than this."""

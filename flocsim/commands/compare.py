@@ -12,10 +12,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     first: results file written by flocsim ensemble
     second: results file to compare with it
-    --numerics: add by how much exact runs would change each difference
+    --numerics: add how much each difference would change if all runs were exact
     """
     known = [
-        f"of {kind.title} {', '.join(f'{name} ({words})' for name, words in kind.compared.items())}"
+        f"for {kind.title}: "
+        + ", ".join(f"{name} ({words})" for name, words in kind.compared.items())
         for kind in studies()
         if kind.compared
     ]

@@ -23,11 +23,12 @@ SUFFIXES = {suffix[1:]: suffix for suffix in WRITERS}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """gsd: the motion saved by flocsim trajectory --save or Trajectory.save, or that of the
-    first swarm of a study, for OVITO and HOOMD's tools, with lengths in um; vtkhdf: the same
-    as outlines for ParaView, in m; csv: the tables of any file that flocsim wrote, their
-    columns as docs/results.md has them, in SI units. For results of a kernel study, matrix: a
-    square matrix for each mechanism and N, whose header says what it multiplies.
+    """Write a file for another program. gsd: the motion saved by flocsim trajectory --save or
+    Trajectory.save, or that of the first swarm of a study, for OVITO and HOOMD's tools, with
+    lengths in um. vtkhdf: the same as outlines for ParaView, in m. csv: the tables of any file
+    that flocsim wrote, with the columns of docs/results.md, in SI units. matrix, for results of a
+    kernel study: a square matrix for each mechanism and N; its header says which kernel it
+    multiplies.
 
     source: file that flocsim wrote
     --output FILE: file to write (default: run.gsd for run.h5, run-TABLE.csv for a table, in the
@@ -36,10 +37,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     --what: for matrices: the quantity to write (default: %(default)s)
     --model: for matrices of efficiencies: the model whose kernels they multiply (default:
         %(default)s); flocmod's settling kernel lacks Stokes's 1/18
-    --curvilinear: for matrices of efficiencies: multiply by this factor of solid spheres, for the
-        water that they push aside. spheres: computed for the study's spheres and forces, a second
-        or two for each pair; others: formulas from the literature. Not known for flocs (default:
-        none, an upper bound)
+    --curvilinear: for matrices of efficiencies: multiply by the collision efficiency of solid
+        spheres that push water aside. spheres: computed for the study's spheres and forces, in a
+        second or two for each pair; others: formulas from the literature. It is not known for
+        flocs (default: no factor, an upper bound)
     """
     add = parser.add_argument
     add("format", choices=(*SUFFIXES, "csv", "matrix"))

@@ -16,11 +16,11 @@ from flocsim.commands.fit_pictures import (
     report,
     titles_of,
 )
-from flocsim.errors import FlocsimError, UsageError
+from flocsim.errors import FlocsimError, UsageError, plural
 from flocsim.fields import read_number
 from flocsim.io.arguments import number, positive, several, whole
 from flocsim.io.files import make_folder, write_file
-from flocsim.io.fit_report import format_errors, plural, population_lines, summary_text
+from flocsim.io.fit_report import format_errors, population_lines, summary_text
 from flocsim.io.images.paper import CUTOFF
 from flocsim.io.images.pictures import label_image
 from flocsim.io.images.stacks import LARGEST_PIXEL, SMALLEST_PIXEL
@@ -39,15 +39,15 @@ OF_STEEPEST = ("threshold", "noise_scale", "saturated")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Find the flocs in pictures, fit a spheropolygon to each at every requested number of
     vertices, and write them to a shape library.  The circle of equal area (N = 1) is always
-    stored too.  A table beside the library lists every region, with the reason for those left
+    stored too.  A table beside the library lists every region, and says why a region was left
     out.
 
       flocsim fit frames/ --pixel-size 0.95e-6 --vertices 4,8,16,64 --radius 1 -o shapes.h5
       flocsim plot shapes.h5          # sizes, and errors against N: the paper's Figs 2 and 3
 
     images IMAGE: picture, or folder of pictures
-    --pixel-size LENGTH: length of a pixel's side, e.g. '0.95 um', or in metres: 0.95e-6 (default:
-        as given in an OME-TIFF or ImageJ file)
+    --pixel-size LENGTH: side of a pixel, e.g. '0.95 um', or in metres: 0.95e-6 (default: as given
+        in an OME-TIFF or ImageJ file)
     --page LIST: pages of a stack to use, counted from 1, separated by commas, or all
     --channel K: channel or colour to use: a number from 1, or a name
     --crop X,Y,W,H: part of every picture to use: left, top, width, height in pixels
@@ -59,13 +59,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     --inscribed: keep every shape inside its floc
     --holes: keep the largest holes of flocs: the vertices are shared between the outline and the
         holes, and area and centroid are those without the holes
-    --band: fit every floc three times, as it is cut and at both ends of its band, for
-        [shapes] outlines = "band": the error of a probability by the cut
+    --band: fit every floc three times, to its outline and to the tightest and the widest outline
+        that its edge allows, for [shapes] outlines = "band": how uncertain outlines change a
+        probability
     --masks: treat the files as masks or labels (PNG, TIFF, .npy, .npz), not pictures
     --jobs K: number of processes (default: %(default)s)
     --output FILE: shape library to write (default: %(default)s)
-    --overlay FILE: draw the outlines at the largest N over the picture (.png, .pdf, .svg), and
-        rejected regions dashed, with the reason; with several pictures, one file each:
+    --overlay FILE: draw the outlines at the largest N over the picture (.png, .pdf, .svg), with
+        rejected regions dashed and the reason; of several pictures, one file each:
         FILE-picture.png
     --fits FOLDER: draw every fit at the largest N: mask, core, the outline swept by the disk, and
         the pixels that differ
@@ -73,29 +74,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         inside it (16-bit PNG), which can be edited and read back by --masks
     --review: also write a page, shapes-review.html for shapes.h5, with all outlines over the
         pictures, to choose flocs by eye; it saves the choices in a file for --reviewed
-    --reviewed FILE: fit the flocs that were chosen on the page of --review
-    --memory GB: memory that a picture may take; larger ones are refused before the work begins
+    --reviewed FILE: fit the flocs that were chosen on the page that --review wrote
+    --memory GB: memory that a picture may take; larger ones are refused before any work is done
         (default: %(default)s)
-    --finder: steepest: each floc is cut where its outline is steepest, against uneven light; paper:
-        as in the paper, a low-pass, stretched grey and Otsu's threshold (default: %(default)s)
-    --cutoff FREQUENCY: with --finder paper: cycles per pixel of which the low-pass lets half
-        through, above 0, to 0.5 (default: 0.2)
+    --finder: steepest: place each outline where the grey changes most steeply, even in uneven
+        light; paper: as in the paper, a low-pass filter, stretched contrast and Otsu's threshold
+        (default: %(default)s)
+    --cutoff FREQUENCY: with --finder paper: frequency at which the low-pass filter halves the
+        amplitude, up to 0.5 cycles per pixel (default: 0.2)
     --flocs: whether flocs are brighter or darker than the background (default: %(default)s)
-    --background: surface: fitted to each picture; median: of all pictures, which a fixed camera
-        took (default: surface)
-    --threshold CONTRAST: contrast from which a pixel belongs to a floc, above 0 to 1: for dark
-        flocs the share of the light that they absorb, for bright ones the grey above the
-        background, white being 1 (default: found for each floc; the median is printed)
+    --background: surface: fitted to each picture; median: of all pictures, if a fixed camera took
+        them (default: surface)
+    --threshold CONTRAST: contrast from which a pixel belongs to a floc, from 0 to 1: of dark flocs
+        the fraction of light that they absorb, of bright ones the grey above the background,
+        where white is 1 (default: found for each floc; the median is printed)
     --noise-scale PX: detail finer than this is noise (default: 1)
-    --saturated SHARE: share of a floc's pixels whose contrast is too high to count for its level
-        (default: 0.001)
+    --saturated FRACTION: fraction of a floc's pixels whose contrast is too high to count for its
+        level (default: 0.001)
     --min-radius PX: smallest r_eq of a floc (default: %(default)s)
     --max-radius PX: largest r_eq of a floc
-    --max-blur SHARE: a region is out of focus where the softness of half of its outline exceeds
-        this share of r_eq, unless it is below 3.5 px; inf: keep all (default: %(default)s)
-    --neck SHARE: separate touching flocs at necks of up to this share of the smaller one's width;
-        0: never (default: 0.5, only where the parts are so compact that they are surely two flocs,
-        and never in a picture of fractal aggregates)
+    --max-blur FRACTION: reject a region as out of focus if at least half of its edge is blurred
+        over more than this fraction of r_eq, and over more than 3.5 px; inf: keep all (default:
+        %(default)s)
+    --neck FRACTION: separate touching flocs at necks of up to this fraction of the smaller one's
+        width; 0: never (default: 0.5, but only where the parts are compact enough to be clearly
+        two flocs, and never in a picture of fractal aggregates)
     """
     add = parser.add_argument
     add("images", nargs="+")
@@ -123,11 +126,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--background", choices=("surface", "median"))
     add("--threshold", type=number("a contrast above 0, to 1", 5e-324, 1.0))
     add("--noise-scale", type=number("pixels, at least 0", 0.0, 1e3))
-    add("--saturated", type=number("a share from 0 to below 1", 0.0, 0.999))
+    add("--saturated", type=number("a fraction from 0 to below 1", 0.0, 0.999))
     add("--min-radius", type=positive, default="4")
     add("--max-radius", type=positive)
-    add("--max-blur", type=number("a share, above 0", 5e-324, float("inf")), default="0.25")
-    add("--neck", type=number("a share from 0 to 1", 0.0, 1.0))
+    add("--max-blur", type=number("a fraction above 0", 5e-324, float("inf")), default="0.25")
+    add("--neck", type=number("a fraction from 0 to 1", 0.0, 1.0))
 
 
 def length(text: str) -> float:
@@ -139,7 +142,7 @@ def length(text: str) -> float:
         hint = f" ({reason})" if str(reason) else ""
     if not SMALLEST_PIXEL <= value <= LARGEST_PIXEL:
         raise argparse.ArgumentTypeError(
-            f"takes a length above 0 such as '0.95 um', or in metres, from {SMALLEST_PIXEL:g} to "
+            f"takes a length such as '0.95 um', or a number of metres, from {SMALLEST_PIXEL:g} to "
             f"{LARGEST_PIXEL:g}, found {text!r}{hint}"
         )
     return value
@@ -150,7 +153,7 @@ def rectangle(text: str) -> tuple[int, ...]:
     numbers = text.replace(" ", "").split(",")
     if len(numbers) != 4 or not all(map(str.isdecimal, numbers)) or "0" in numbers[2:]:
         raise argparse.ArgumentTypeError(
-            f"takes X,Y,WIDTH,HEIGHT in pixels, width and height above 0, found {text!r}"
+            f"takes X,Y,WIDTH,HEIGHT in pixels with width and height above 0, found {text!r}"
         )
     return tuple(map(int, numbers))
 
@@ -164,13 +167,13 @@ def check(args: argparse.Namespace) -> None:
          "--page, --channel and --crop apply to pictures, not to --masks"),
         (args.inscribed and (args.preserve_area or args.method != "pattern"),
          "--inscribed needs --method pattern and excludes --preserve-area: a shape inside its "
-         "floc has less than its area"),
+         "floc has a smaller area"),
         (paper and (args.masks or foreign),
          f"--{'masks' if args.masks else ''.join(foreign[:1]).replace('_', '-')} does not apply to "
          "--finder paper: leave one of them out"),
         (not paper and args.cutoff is not None, "--cutoff applies to --finder paper only"),
         (args.band and (args.masks or args.holes),
-         "--band excludes --masks, which do not show where else an outline might be, and --holes"),
+         "--band excludes --holes, and --masks, which do not show where else an outline might be"),
     ):  # fmt: skip
         if wrong:
             raise UsageError(message)
@@ -205,7 +208,7 @@ def run(args: argparse.Namespace) -> int:
         # Regions that the filters have left out can be added on the page.
         draw_review(pages, pictures, args)
         problem = FlocsimError if lost else UsageError
-        raise problem("nothing was fitted, no shape library was written")
+        raise problem("nothing was fitted, so no shape library was written")
     settings = {
         "method": args.method, "preserve_area": args.preserve_area, "inscribed": args.inscribed,
     }  # fmt: skip
@@ -237,7 +240,7 @@ def run(args: argparse.Namespace) -> int:
         draw_fits(args.fits, pictures, rule)
     draw_review(pages, pictures, args)
     if lost:
-        raise FlocsimError(f"lost: {', '.join(lost)}; all else was written")
+        raise FlocsimError(f"not fitted: {', '.join(lost)}; everything else was written")
     return 0
 
 

@@ -17,11 +17,11 @@ import attrs
 import numpy as np
 
 from flocsim.commands.processes import Lost, workers
-from flocsim.errors import FileError, FlocsimError, ImageError, ShapeError, UsageError
+from flocsim.errors import FileError, FlocsimError, ImageError, ShapeError, UsageError, plural
 from flocsim.geometry.fit.fit import Fit, fit_mask
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.files import Rule, write_file
-from flocsim.io.fit_report import picture_line, plural
+from flocsim.io.fit_report import picture_line
 from flocsim.io.images.background import FEWEST_FRAMES
 from flocsim.io.images.masks import ARRAYS, MASK_SUFFIXES, is_mask, read_masks, segment_mask
 from flocsim.io.images.paper import segment_as_paper
@@ -133,7 +133,7 @@ def fit_pictures(paths: Sequence[Path], options: Namespace) -> tuple[list[Pictur
             progress.report(len(masks) - place - 1)
         progress.finish()
     for name, reason in lost.items():
-        report(f"{name} was not fitted: {reason}; the other pictures were")
+        report(f"{name} was not fitted: {reason}; the other pictures were fitted")
     return [each for each in pictures if each.name not in lost], list(lost)
 
 
@@ -204,7 +204,7 @@ def pictures_in(path: Path, options: Namespace) -> Iterator[tuple[str, Plane, np
     for page, plane in planes_of(path, stack_of(path), options.page, options.channel, options.crop):
         pixels = read_pixels(path, plane, options.memory)
         if is_mask(pixels):
-            raise ImageError(f"{path}: holds masks or labels, left out: fit them with --masks")
+            raise ImageError(f"{path}: was left out, as it holds masks or labels: give --masks")
         yield page, plane, grey_of(pixels, path)
 
 
@@ -216,8 +216,8 @@ def picture_of(
     size = options.pixel_size or pixel_size_in(path, stack_of(path))
     if size is None:
         raise UsageError(
-            f"{path}: does not give the size of a pixel, as OME-TIFF and ImageJ files do; give the "
-            "length of its side, for example --pixel-size '0.95 um'"
+            f"{path}: does not state the size of a pixel, as OME-TIFF and ImageJ files do; give "
+            "the length of its side, for example --pixel-size '0.95 um'"
         )
     choices = choices_of(name, checksum, found)
     if by_eye is not None:
@@ -318,8 +318,8 @@ def draw_review(paths: Sequence[Path], pictures: Sequence[Picture], options: Nam
         page = review_page(template.read_text("utf-8"), pictures, greys)
         write_file(path, page.encode(), options.overwrite)
         print(
-            f"{path}: choose flocs on it, save the choices, and run this command again with "
-            f"--reviewed {FILE_OF_CHOICES} --overwrite in the place of --review"
+            f"{path}: choose flocs on this page, save the choices, and run this command again with "
+            f"--reviewed {FILE_OF_CHOICES} --overwrite instead of --review"
         )
         # Without a display a browser would take over the terminal.
         has_display = sys.platform in ("darwin", "win32") or any(map(os.environ.get, DISPLAYS))

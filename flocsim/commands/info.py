@@ -13,17 +13,17 @@ from flocsim.io.journal import journal_of
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Print the contents of a file: conditions, counts, probabilities with 95 % intervals,
-    and its origin; of a study that is running or was interrupted, the replicates so far,
-    without touching it.
+    and how it was made. Of a study that is running or was interrupted, print the replicates so
+    far, without disturbing it.
 
     results: file written, or being written, by flocsim
     --numerics: add the numerical error of each probability to the table
     --all: add all columns to the table
-    --config: print only the config that it was run with
-    --modules: print only the user's modules that it was run with
-    --water: print only how often the equivalent spheres of a study of pairs or rates touch, with
-        and without the water that they push at each other (a second or two for each pair); of a
-        shape library, how fast its flocs settle and turn
+    --config: print only the config of the study
+    --modules: print only the user's modules that the study used
+    --water: print only how often the equivalent spheres of a study of pairs or kernels touch, with
+        and without hydrodynamic interaction (a second or two for each pair); of a shape library,
+        how fast its flocs settle and rotate
     """
     parser.add_argument("results")
     for name in ("--numerics", "--all", "--config", "--modules", "--water"):
@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     journal = journal_of(args.results)
     if journal is not None:
         if args.config or args.modules or args.water:
-            raise FileError(f"{journal} has no config: it belongs to a run that has not ended")
+            raise FileError(f"{journal} has no config: it belongs to an unfinished run")
         # All kinds of studies, and the engine with them, are wanted here alone.
         from flocsim.ensembles.storage.unfinished import read_unfinished
 

@@ -22,7 +22,7 @@ KINDS = {
     "force": "a force of your own, with its module",
     "sweep": "several values of a key",
     "swarm": "many bodies in a box",
-    "kernel": "rates for population balances",
+    "kernel": "collision kernels for population balances",
     "brownian": "two bodies brought together by thermal motion",
 }
 """What there is to begin with: {name: help}."""
@@ -35,7 +35,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Write a commented example of a config file, ready to run.
 
     file: file to write (default: %(default)s)
-    --shapes FILE: shape library of `flocsim fit` whose flocs the study has
+    --shapes FILE: shape library, written by `flocsim fit`, with the flocs of the study
     """
     kinds = "; ".join(f"{name}: {words}" for name, words in KINDS.items())
     add = parser.add_argument

@@ -15,10 +15,10 @@ import attrs
 from flocsim import commands
 from flocsim.commands import add_overwrite
 from flocsim.ensembles.contents import Contents, Figures, Summary
-from flocsim.errors import UsageError
+from flocsim.errors import UsageError, plural
 from flocsim.hydrodynamics import prism_drag
 from flocsim.io.arguments import document, number
-from flocsim.io.fit_report import format_errors, measures_in, plural, population_lines
+from flocsim.io.fit_report import format_errors, measures_in, population_lines
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import check_outputs
 from flocsim.io.plots.shapes import POPULATION_FIGURES
@@ -51,8 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
       flocsim shapes select shapes.h5 --drop 023.png#7,025.png#1 -o good.h5
       flocsim shapes merge monday.h5 tuesday.h5 -o mud.h5
 
-    r_eq is that of the floc as it was measured: its pixels times the size of a pixel.  list
-    also prints the perimeter, the largest and least Feret diameter, aspect ratio, circularity
+    r_eq is that of the measured floc, from its number of pixels and the size of a pixel.  list
+    also prints the perimeter, the largest and smallest Feret diameter, aspect ratio, circularity
     4 pi A/P^2 and solidity of every floc, D10, D50 and D90 of the diameters 2 r_eq by number
     and by volume, and the perimeter-based fractal dimension.
     """
@@ -71,9 +71,9 @@ def add_libraries(parser: argparse.ArgumentParser, selects: bool, writes: bool) 
     """Add the arguments of an action.
 
     libraries LIBRARY: shape library written by flocsim fit
-    --keep LIST: these flocs only, by name, separated by commas
-    --drop LIST: all but these flocs
-    --picture NAME: flocs of this picture only; * stands for any characters
+    --keep LIST: only these flocs, by name, separated by commas
+    --drop LIST: all flocs except these, by name, separated by commas
+    --picture NAME: only flocs of this picture; * stands for any characters
     --min-radius METRES: flocs of at least this r_eq
     --max-radius METRES: flocs of at most this r_eq
     --output FILE: shape library to write
@@ -237,9 +237,9 @@ class LibraryFiles(Contents):
         sizes = [MICRO * entry.measured_radius for entry in found.entries]
         banded = all(entry.is_banded for entry in found.entries)
         return Summary([
-            ("shapes", f"{len(found.entries)} of {len(images)} pictures"),
+            ("shapes", f"{len(found.entries)} of {plural(len(images), 'picture')}"),
             ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
-            *([("outlines", "as cut, and at both ends of their bands (--band)")] if banded else []),
+            *([("outlines", "as cut, and cut closer and wider (--band)")] if banded else []),
             *((name.replace("_", " "), str(value)) for name, value in found.settings.items()),
         ])  # fmt: skip
 
@@ -252,9 +252,9 @@ class LibraryFiles(Contents):
             words = [*(f"{each:.3f}" for each in numbers), f"{100.0 * drag.error:.1f}"]
             rows.append([entry.floc_id, *words])
         heading = (
-            f"prisms of {len(rows) - 1} outlines, 4/3 r_eq deep: largest and least settling speed, "
-            "and rate of turning, over those of the equivalent spheres; B, the response to strain, "
-            "over that of a line"
+            f"Slow flow around {plural(len(rows) - 1, 'floc')}, as prisms 4/3 r_eq deep. Largest "
+            "and smallest settling speed and rotation rate, relative to the equivalent sphere; B: "
+            "response to strain, 1 for a line."
         )
         return [heading, *aligned(rows)]
 

@@ -24,17 +24,18 @@ SAVED_EVERY = 30.0
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Put every doublet that a finished study found bound into a flow of rising rate G, without
-    weight or inertia, and find the first rate at which it opens: on a ladder of factors of
-    two, then by halving in log G. Prints the distribution of every condition, and writes it
-    and every single doublet to one HDF5 file, with a figure beside it.
+    """Find the flow rate at which bonds open. Every bound doublet of a finished study is put into
+    a flow of rising rate G, without weight or inertia. The first rate at which it opens is found
+    in steps of a factor of two, then by bisection in log G. Prints the distribution of every
+    condition, and writes it and every single doublet to one HDF5 file, with a figure beside it.
 
     results: results file of flocsim ensemble
     --flow FLOW: shear, u = (G y, 0), or extension, u = (G x, -G y)/2 (default: %(default)s)
     --count K: number of doublets of each condition (default: all)
     --precision P: relative precision of a rate (default: %(default)g)
     --jobs N: processes on this machine (default: %(default)d)
-    --resume: test what the output does not have yet, of a stopped survey or with a larger --count
+    --resume: test the doublets that the output does not have yet, of a stopped survey or for a
+        larger --count
     --output FILE: default: NAME-strength.h5
     """
     add = parser.add_argument

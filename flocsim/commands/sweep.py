@@ -21,10 +21,10 @@ COMMAS = re.compile(r""",(?=(?:[^"'\[\]]|"[^"]*"|'[^']*'|\[[^\]]*\])*$)""")
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Run a study at every value of a key, or of several (all combinations), and join the results
+    """Run a study at every value of a key, or at all combinations of several, and join the results
     in one file whose tables have the keys as their first dimensions. The results of each value
-    lie in NAME.parts beside it; --resume goes on there. On a cluster, --dry-run prints a command
-    for each value to be run by itself; --resume then joins what they made.
+    are stored in the folder NAME.parts beside it; --resume continues from there. On a cluster, run
+    the commands that --dry-run prints, one for each value; --resume then joins their results.
 
     config: config file (TOML)
     --over KEY=VALUE,…: a key and its values, e.g. forces.van_der_waals.hamaker=1e-20,1e-19; may be
@@ -62,7 +62,7 @@ def run(args: Namespace) -> int:
     except (KeyboardInterrupt, StopRequested) as error:
         # The process of a part may have been stopped alone, and has said by what.
         who = str(error).partition(":")[0] or "stopped by SIGINT"
-        print(f"flocsim: {who}: what was finished is kept\n{continuing()}", file=sys.stderr)
+        print(f"flocsim: {who}: finished results are saved\n{continuing()}", file=sys.stderr)
         return STOPPED
 
 

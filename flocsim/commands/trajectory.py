@@ -141,8 +141,8 @@ class TrajectoryFiles(Contents):
         if len(found.shapes) == 2:
             apart = 1e6 * centre_distance(found.position)
             facts.append(
-                ("centre distance", f"{apart[0]:.4g} µm at first, {apart.min():.4g} at least, "
-                 f"{apart[-1]:.4g} at last")
+                ("centre distance", f"{apart[0]:.4g} µm at the start, at least {apart.min():.4g}, "
+                 f"{apart[-1]:.4g} at the end")
             )  # fmt: skip
         for name, value in found.facts.items():
             if name not in ("config", *SOURCE):

@@ -43,11 +43,11 @@ COLUMNS = {
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Run some replicates of a study by both adaptive methods over six decades of tolerance, and
-    print how many outcomes flip, the error against a ten times tighter reference at the time when
-    the first of the two is decided, and the CPU time. Tolerances begin at the smallest length of
-    the outlines, rounded to a decade: at 1e-6 m, a spheroradius, for tang2014. Conditions are
-    chosen by --set, as --set 'scene.types=["III"]' --set shapes.vertices=[16].
+    """Run some replicates of a study by both adaptive methods over six decades of tolerance. Print
+    how many outcomes flip, the error relative to a ten times tighter reference when the first of
+    the two runs ends, and the CPU time. Tolerances start at the smallest length of the outlines,
+    rounded to a decade: at 1e-6 m, the spheroradius, for tang2014. Choose conditions by --set, as
+    in --set 'scene.types=["III"]' --set shapes.vertices=[16].
 
     config: config file (TOML)
     --count K: replicates of each type (default: %(default)s)
@@ -131,7 +131,7 @@ def run(args: Namespace) -> int:
             print(each.line)
     # Half of Wilson's 95 % interval of a probability of ½.
     error = 50.0 * Z / math.sqrt(expected_replicates(config) + Z * Z)
-    print(f"\nto compare with flips: the sampling error of the study is {error:.2g} %")
+    print(f"\nCompare flips with the sampling error of the study, {error:.2g} %.")
     if args.output:
         save(error_against_time(ladders), args.output, rule, source_line(study.source))
         print(args.output)

@@ -19,30 +19,30 @@ from flocsim.ensembles.parallel.processes import (
     launched_rank,
     start_processes,
 )
-from flocsim.errors import FlocsimError, UsageError
+from flocsim.errors import FlocsimError, UsageError, plural
 from flocsim.io.outputs import check_outputs
 from flocsim.io.terminal import plain_warnings
 from flocsim.process import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent, stop_requested
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Run the study of a config file, on one process or, under mpirun, on all ranks.
+    """Run the study of a config file, in one process or, under mpirun, on all ranks.
 
     config: config file (TOML), - for standard input; `flocsim init` writes an example
     --set KEY=VALUE: override any value of the config, e.g. --set 'scene.delta=[0.0, 0.5]' or --set
         forces.contact.k_n='10 N/m'; may be repeated
-    --seed: seed, overriding the config's
-    --replicates: replicates, overriding the config's
-    --output FILE: results file, overriding the config's
+    --seed: seed, instead of the config's
+    --replicates: number of replicates, instead of the config's
+    --output FILE: results file, instead of the config's
     --jobs N: processes on this machine, without MPI
     --resume: continue an unfinished run, or extend a finished one; starts one if there is none
     --restart: start over; an unfinished run is kept under another name (finished results:
         --overwrite)
     --overwrite: replace files that exist; each is kept, study.h5 as study.1.h5
-    --dry-run: show what would be run, and what is doubtful, and stop: nothing is compiled or run
-    --pilot: with --dry-run: run some replicates for some seconds, to estimate the core-hours of the
+    --dry-run: show what would be run, with warnings, and stop: nothing is compiled or run
+    --pilot: with --dry-run: run replicates for a few seconds, to estimate the core-hours of the
         study and the size of its file
-    --verbose: with --dry-run: show what the engine makes of collisions, forces and time scales
+    --verbose: with --dry-run: also show collisions, forces and time scales
     --quiet: print warnings and errors only
     """
     add = parser.add_argument
@@ -144,8 +144,8 @@ def study(config: Any, comm: Communicator, options: argparse.Namespace) -> int:
     if not options.quiet:
         print(shown.table(found))
         print(shown.source(found))
-        print(f"{output}: {ended.total} replicates, {ended.computed} of them run in "
-             f"{seconds:.1f} s, {ended.computed / seconds:.0f}/s")  # fmt: skip
+        print(f"{output}: {plural(ended.total, 'replicate')}, of which {ended.computed} were run "
+              f"now, in {seconds:.1f} s ({ended.computed / seconds:.2g}/s)")  # fmt: skip
     code, line = shown.verdict(found)
     if line:
         print(f"flocsim: {line}; the rows are in {output}", file=sys.stderr)

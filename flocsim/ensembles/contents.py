@@ -179,10 +179,12 @@ def open_kind(path: str | os.PathLike, ability: str = "read") -> tuple[Contents,
         name = file.kind
     if name in FILES and getattr(contents_of(name), ability) is not None:
         return contents_of(name), file
-    able = [each for each in FILES if getattr(contents_of(each), ability) is not None]
+    able = [each for each in map(contents_of, FILES) if getattr(each, ability) is not None]
     if name:
-        raise FileError(f"{path} holds a {name}: name a file of {' or '.join(able)}")
-    return contents_of(able[0]), file
+        what = contents_of(name).title if name in FILES else f'"{name}"'
+        titles = " or ".join(each.title for each in able)
+        raise FileError(f"{path} holds {what}: name a file with {titles}")
+    return able[0], file
 
 
 def studies() -> list[Contents]:

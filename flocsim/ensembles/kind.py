@@ -21,6 +21,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.config import STUDIES
+from flocsim.errors import plural
 from flocsim.io.results.run_group import SOURCE, package_version
 from flocsim.io.results.schema import REPLICATES
 
@@ -214,8 +215,8 @@ class StudyKind:
         """Return the study in a few words, as in "120 replicates: … , on 2 ranks"."""
         types, vertices, delta, replicates = self.shape
         axes = ((types, "type"), (vertices, "vertex count"), (delta, "displacement"))
-        words = " x ".join(f"{count} {noun}{'s' * (count != 1)}" for count, noun in axes)
-        return f"{self.size} replicates: {words} x {replicates}"
+        words = " x ".join(plural(*axis) for axis in axes)
+        return f"{plural(self.size, 'replicate')}: {words} x {replicates}"
 
     @property
     def flocs_in_words(self) -> str:

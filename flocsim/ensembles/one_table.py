@@ -84,7 +84,9 @@ class OneTable(Contents):
         runs = [store.runs[place][:1] for place in range(len(store.conditions))]
         there = min(each[0][1] if each and each[0][0] == 0 else 0 for each in runs)
         if there == 0:
-            raise FileError(f"{store.journal.path} lacks some condition yet: try again later")
+            raise FileError(
+                f"{store.journal.path} does not have all conditions yet: try again later"
+            )
         many = asked["replicates"] * len(store.conditions)
         return self.stored(store, asked, there, {}), store.there(), many
 

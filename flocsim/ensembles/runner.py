@@ -30,7 +30,7 @@ from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.storage.resume import NEW, Beginning, begin, claim
-from flocsim.errors import FlocsimError, UsageError
+from flocsim.errors import FlocsimError, UsageError, plural
 from flocsim.io.results.run_group import provenance, source_line, storable
 from flocsim.io.terminal import Progress
 from flocsim.process import INTERRUPTION, STOPPED
@@ -105,8 +105,8 @@ def run_to_file(
         ended = lead(study, start, comm, progress, output)
         if ended.code == 0 and start.has_more(ended.count):
             progress.warn(
-                f"{journal.path} has more rows than were asked for, and is kept: --resume uses "
-                "them when more are asked for"
+                f"{journal.path} has more rows than this run needs, and is kept: a larger run uses "
+                "them with --resume"
             )
         elif ended.code == 0:
             journal.remove()
@@ -167,8 +167,8 @@ def lead(
     INTERRUPTION.kept = partial(kept_words, start, state)
     remaining = state.schedule.remaining
     ranks, existing = comm.size, study.size - remaining
-    line = f"{study.title}, on {ranks} rank{'s' * (ranks > 1)}"
-    line += f"; {existing} of them exist already" if existing else ""
+    line = f"{study.title}, on {plural(ranks, 'rank')}"
+    line += f"; {existing} already exist" if existing else ""
     progress.say(f"{line}; {source_line(study.source)}")
     comm.broadcast(remaining)
     if remaining:
@@ -196,8 +196,8 @@ def kept_words(start: Beginning, state: StudyState) -> str:
     count, begun = start.store.computed, len(state.begun)
     if not count and not begun:
         return "no replicate was finished"
-    others = f" and the states of {begun} others" if begun else ""
-    return f"{count} finished replicates{others} are in {start.store.journal.path}"
+    others = f" and the states of {plural(begun, 'unfinished one')}" if begun else ""
+    return f"{plural(count, 'finished replicate')}{others}: saved in {start.store.journal.path}"
 
 
 def compile_in_turn(study, comm):

@@ -83,13 +83,13 @@ class Thermal(BodyForce):
 
     temperature: float = quantity("K", at_least=0.0, default=298.15)
     kick: float | str = word_or_quantity(
-        "auto", "s", above=0.0, default="auto", help="how long a random force stays the same"
+        "auto", "s", above=0.0, default="auto", help="time for which a random force is constant"
     )
     finest: float | str = word_or_quantity(
         "auto", "m", above=0.0, default="auto",
-        help="kicks are halved near contact down to this way",
+        help="displacement per kick below which kicks are not halved near contact",
     )  # fmt: skip
-    rotational: bool = flag(default=True, help="random torque, too")
+    rotational: bool = flag(default=True, help="also apply a random torque")
 
     @property
     def absent(self) -> str:
@@ -118,13 +118,13 @@ class Thermal(BodyForce):
     def remarks(self, fluid: Fluid) -> list[str]:
         """Return the duration of kicks in words."""
         length = (
-            f"as long as diffusion by {KICK_DISPLACEMENT:g} of the smallest radius takes"
+            f"the time to diffuse {KICK_DISPLACEMENT:g} of the smallest radius"
             if isinstance(self.kick, str)
-            else f"of {self.kick:.3g} s"
+            else f"{self.kick:.3g} s"
         )
         least = self.least_displacement
-        near = "" if least == math.inf else f", halved near contact down to ways of {least:.3g} m"
-        return [f"steps end at kicks {length}{near}"]
+        near = f", shorter near contact, down to displacements of {least:.3g} m"
+        return [f"a kick lasts {length}{near * (least < math.inf)}"]
 
     @staticmethod
     def kernel(body, viscosity, energy, rotational):
@@ -158,14 +158,14 @@ def kick_parameters(
         raise UsageError("a scene has one temperature: give one Thermal force")
     if follows_shape(forces):
         raise UsageError(
-            'thermal motion cannot have the drag law "shape": its kicks are those of equivalent '
-            "spheres, and such bodies would not stay at their temperature: give another law"
+            'Thermal cannot be combined with the drag law "shape": its kicks are those of '
+            "equivalent spheres, and the bodies would not stay at its temperature; give another law"
         )
     if shields_clusters(forces) or is_permeable(forces):
         raise UsageError(
-            "thermal motion cannot have a drag that is less in clusters, or of permeable bodies: "
-            "its kicks are those of solid spheres alone, and such bodies would get too hot; leave "
-            "the drag's clusters and permeability out"
+            "Thermal cannot be combined with a drag that is reduced by clusters or permeability: "
+            "its kicks are those of single solid spheres, and the bodies would get too hot; leave "
+            "clusters and permeability out of the drag"
         )
     thermal = found[0]
     # Mean squared relative displacement per time of the two most mobile bodies: ⟨x²⟩ = 2 (D_i +

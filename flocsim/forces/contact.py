@@ -150,8 +150,8 @@ class Contact(ContactForce):
     )  # fmt: skip
     restitution: float | None = quantity(
         "", above=0.0, at_most=1.0, default=None, kw_only=True,
-        help="coefficient of restitution e of two spheres that meet head-on, instead of "
-        "`damping_n`, which follows from it with `tension` or without",
+        help="coefficient of restitution e of two spheres that collide head-on, instead of "
+        "`damping_n`, which then follows from it and from `tension`",
     )  # fmt: skip
     k_n: float = quantity(
         "N/m",
@@ -175,12 +175,12 @@ class Contact(ContactForce):
         "proportional", "1/s", at_least=0.0, default="proportional"
     )
     friction: float | str = word_or_quantity("none", "", at_least=0.0, default="none")
-    tension: bool = flag(default=True, help="false: the normal force never pulls")
+    tension: bool = flag(default=True, help="whether the normal force may pull")
 
     def __attrs_post_init__(self):
         for name, replaced in REPLACED_BY.items():
             if (getattr(self, name) is None) == (getattr(self, replaced) is None):
-                raise RangeError(f"give either {name} or {replaced}, not both")
+                raise RangeError(f"give one of {name} and {replaced}")
 
     @property
     def stiffness_key(self) -> tuple[str, str]:

@@ -25,9 +25,7 @@ GAPS = {"equivalent_spheres": "centres", "surface": "surfaces"}
 """{key ``gap``: where the force acts}: between equivalent spheres (the paper), or between outlines.
 """
 
-CUT_HELP = (
-    "gap beyond which the force is left out, where that is to be nearer than it is negligible"
-)
+CUT_HELP = "gap beyond which the force is neglected; by default, where it is negligible anyway"
 
 
 RETARDATION = 5.32
@@ -54,11 +52,11 @@ def smaller_reach(cut: float | None, reach: float) -> float:
 
 
 LAW_HELP = (
-    "spheres: as strong as between the equivalent spheres, over the gap of `gap`; outline: the sum "
-    "over both bodies as they are (pairs that settle)"
+    "spheres: the force of the equivalent spheres at the distance that `gap` states; outline: the "
+    "sum over both outlines (settling pairs only)"
 )
 
-DEPTH_HELP = 'thickness of the bodies of law = "outline"; "sphere" = 4/3 r_eq of the smaller one'
+DEPTH_HELP = 'law = "outline": thickness of the bodies; "sphere" = 4/3 r_eq of the smaller one'
 
 
 @attrs.frozen
@@ -98,7 +96,7 @@ class VanDerWaals(PairForce):
         "sphere", "m", above=0.0, default="sphere", help=DEPTH_HELP
     )
     wavelength: float | None = quantity(
-        "m", above=0.0, default=None, help='λ of the retardation of law = "outline"; none without'
+        "m", above=0.0, default=None, help='law = "outline": wavelength λ of the retardation'
     )
 
     @property
@@ -161,8 +159,8 @@ class VanDerWaals(PairForce):
 
 
 BOUNDARY_HELP = (
-    'what bodies keep as they come near, of law = "outline": their potentials, their charges, or '
-    "neither (the sum of what each has alone)"
+    'law = "outline": whether surfaces have a constant potential, a constant charge, or '
+    "superposed double layers as they approach"
 )
 
 
@@ -204,7 +202,7 @@ class DoubleLayer(PairForce):
     """
 
     potential: float | tuple[float, float] = quantity_of_each(
-        "V", default=15e-3, help="of both bodies; or of each, as [15e-3, -40e-3]"
+        "V", default=15e-3, help="of the surfaces of both bodies; or of each, as [15e-3, -40e-3]"
     )
     debye_length: float = quantity("m", above=0.0, default=0.98e-6)
     permittivity: float = quantity("", above=0.0, default=WATER_PERMITTIVITY)
@@ -218,21 +216,21 @@ class DoubleLayer(PairForce):
         "sphere", "m", above=0.0, default="sphere", help=DEPTH_HELP
     )
     d_min: float | None = quantity(
-        "m", above=0.0, default=None, help="least gap of a `boundary` whose pressure has no bound"
+        "m", above=0.0, default=None, help="smallest gap used by a `boundary` that diverges at 0"
     )
 
     def __attrs_post_init__(self) -> None:
         if self.boundary != "superposition" and self.law != "outline":
             raise RangeError(
-                f'boundary = "{self.boundary}" is of law = "outline", found law = "{self.law}": '
-                "give that, or leave boundary out"
+                f'boundary = "{self.boundary}" needs law = "outline", found law = "{self.law}": '
+                "set that law, or leave boundary out"
             )
         # Its last part, of 1/sinh², diverges at d = 0: a least gap must be chosen by the user.
         if self.parts[2] != 0.0 and self.d_min is None:
             like = "" if self.boundary == "charge" else " between unlike potentials"
             raise RangeError(
-                f'boundary = "{self.boundary}"{like} has a pressure without bound where outlines '
-                "touch: give d_min, the least gap that counts, as 0.3 nm"
+                f'boundary = "{self.boundary}"{like} has an infinite pressure at contact: give '
+                'd_min, the smallest gap to use, such as "0.3 nm"'
             )
 
     @property
@@ -348,5 +346,5 @@ def refuse_unlike_potentials(forces: Iterable[Force], bodies: int) -> None:
     """Raise UsageError for two different potentials in a scene of more than two bodies."""
     if bodies > 2 and any(map(has_unlike_potentials, forces)):
         raise UsageError(
-            f"potential = [a, b] is of two unlike bodies, found {bodies} bodies: give one number"
+            f"potential = [a, b] is for two bodies, found {bodies} bodies: give one number"
         )

@@ -176,38 +176,38 @@ class StokesDrag(BodyForce):
         "schiller_naumann",
         "shape",
         default="stokes",
-        help="schiller_naumann: times 1 + 0.15 Re^0.687, Re = 2 r_eq ρ_f v/γ, for Re up to 800; "
-        "shape: slow flow around each body's own outline",
+        help="schiller_naumann: Stokes's drag times 1 + 0.15 Re^0.687, Re = 2 r_eq ρ_f v/γ, for Re "
+        "up to 800; shape: slow flow around the outline of each body",
     )
 
     strain: bool = flag(
-        default=False, help="a flow's strain turns long bodies, too: Jeffery's orbits"
+        default=False, help="let the strain of the flow rotate long bodies (Jeffery orbits)"
     )
 
     clusters: bool = flag(
         default=False,
-        help="in swarms: flocs that touch shield each other from the flow, so that a cluster "
-        "settles at its own speed",
+        help="in swarms: let touching flocs shield each other from the flow, so that a cluster "
+        "settles faster than its flocs",
     )
     permeability: float = quantity(
         "m^2", at_least=0.0, default=0.0,
-        help="of flocs that water passes through: k of Brinkman's equation in the equivalent "
-        "sphere; 0: none does",
+        help="k of Brinkman's equation inside the equivalent sphere; 0: no water passes through "
+        "the flocs",
     )  # fmt: skip
 
     def __attrs_post_init__(self) -> None:
         if self.strain and not self.rotational:
             raise RangeError(
-                "strain must be false where rotational is: it is a part of the drag torque"
+                "strain must be false if rotational is false: it is part of the drag torque"
             )
         if self.law == "shape" and self.permeability > 0.0:
             raise RangeError(
-                'permeability must be 0 where law is "shape": it is known of equivalent spheres'
+                'permeability must be 0 if law is "shape": it is known for spheres only'
             )
         if self.law == "shape" and not self.rotational:
             raise RangeError(
-                'rotational must be true where law is "shape": a shape that is pushed beside where '
-                "it resists turns, and turning pushes it"
+                'rotational must be true if law is "shape": the drag of a shape couples '
+                "translation and rotation"
             )
 
     @property
@@ -231,14 +231,14 @@ class StokesDrag(BodyForce):
 
     def remarks(self, fluid: Fluid) -> list[str]:
         """Return whether the drag depends on shape, strain, clusters and permeability."""
-        others = ["less in clusters of a swarm"] * self.clusters
-        others += ["less as water passes through"] * (self.permeability > 0.0)
+        others = ["reduced in clusters of a swarm"] * self.clusters
+        others += ["reduced by permeability"] * (self.permeability > 0.0)
         if self.law == "shape":
-            return ["of each body's own outline", *others]
+            return ["depends on the outline of each body", *others]
         if not self.strain:
             return others
         strained = any(strain_of(fluid.flow))
-        words = "long bodies turned by strain" if strained else "no strain in this flow: left out"
+        words = "strain rotates long bodies" if strained else "this flow has no strain: left out"
         return [words, *others]
 
     @staticmethod

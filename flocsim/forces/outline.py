@@ -32,8 +32,8 @@ LEAST_LAYER_GAP = 0.005
 
 
 NEEDS_BOTH_SHAPES = {
-    "outlines": ("acts along outlines", 'give gap = "surface" in the place of law = "outline"'),
-    "orientations": ("asks how bodies are turned", "leave it out"),
+    "outlines": ("acts along outlines", 'give gap = "surface" instead of law = "outline"'),
+    "orientations": ("depends on the angles of the bodies", "leave it out"),
 }
 """{what a PairForce acts on: (description, advice)} for forces that need both bodies' shapes or
 angles, not only their distance."""
@@ -50,8 +50,8 @@ def refuse_outlines(forces: Iterable[Force], subject: str) -> None:
     for force in filter(needs_both_shapes, forces):
         words, advice = NEEDS_BOTH_SHAPES[force.acts_on]
         raise UsageError(
-            f"{type(force).__name__} {words}, and {subject} has forces between spheres or nearest "
-            f"points alone: {advice}"
+            f"{type(force).__name__} {words}, but {subject} can only have forces between spheres "
+            f"or nearest points: {advice}"
         )
 
 
@@ -63,7 +63,7 @@ def charge_layer(forces: Iterable[PairForce], shapes: Sequence[Shape]) -> Double
     """
     layers = [force for force in forces if isinstance(force, DoubleLayer)]
     if len(layers) > 1:
-        raise UsageError("one double layer acts along outlines, found several: leave all but one")
+        raise UsageError("only one double layer can act along outlines, found several: keep one")
     if not layers or not shapes or not layers[0].first or is_thin(shapes, layers[0].kappa):
         return None
     # Tabulated fields end at LAYER_REACH Debye lengths; a cut would be ignored.

@@ -54,13 +54,13 @@ class Lubrication(SurfaceForce):
     """
 
     h_min: float = quantity(
-        "m", above=0.0, default=MINIMUM_GAP, help="the resistance grows no further below this gap"
+        "m", above=0.0, default=MINIMUM_GAP, help="gap below which the resistance is constant"
     )
     cut: float = quantity(
         "m",
         above=0.0,
         default=1e-5,
-        help="gap at which the force ends; it fades from half of it on",
+        help="gap at which the force ends; it fades out from half of this gap",
     )
 
     def __attrs_post_init__(self) -> None:
@@ -126,21 +126,21 @@ class PairResistance(Force):
     """
 
     h_min: float = quantity(
-        "m", above=0.0, default=MINIMUM_GAP, help="the resistance grows no further below this gap"
+        "m", above=0.0, default=MINIMUM_GAP, help="gap below which the resistance is constant"
     )
     cut: float = quantity(
         "",
         at_least=5.0,
         at_most=0.5 * pair.FARTHEST,
         default=20.0,
-        help="gap over r_i + r_j at which it ends; it fades from half of it on",
+        help="gap over r_i + r_j at which it ends; it fades out from half of this gap",
     )
 
     @staticmethod
     def kernel(view):
         """Raise NotImplementedError: loads follow from tables
         (integrators/rhs/pair_resistance.py)."""
-        raise NotImplementedError("a pair resistance is no kernel")
+        raise NotImplementedError("PairResistance has no kernel")
 
 
 def resistance_of_pairs(forces: Iterable[Force]) -> PairResistance | None:
@@ -153,27 +153,26 @@ def resistance_of_pairs(forces: Iterable[Force]) -> PairResistance | None:
     if not found:
         return None
     if len(found) > 1:
-        raise UsageError("there is one PairResistance at most, found more: leave all but one out")
+        raise UsageError(f"give only one PairResistance, found {len(found)}")
     for force in forces:
         if isinstance(force, Lubrication):
             raise UsageError(
-                "Lubrication is a part of PairResistance and would count twice: leave one of them "
-                "out"
+                "Lubrication is part of PairResistance and would count twice: leave one of them out"
             )
         # Fluctuation–dissipation: kicks must have the covariance of the joint resistance.
         if isinstance(force, Thermal) and not force.absent:
             raise UsageError(
-                "thermal kicks do not go with PairResistance, for they would have to be correlated "
-                "between bodies as it is: leave Thermal or PairResistance out"
+                "Thermal cannot be combined with PairResistance: its kicks would have to be "
+                "correlated between the bodies; leave one of them out"
             )
     # The tables contain the drag of single spheres in slow flow: it must be there to be subtracted.
     drags = [force for force in forces if isinstance(force, StokesDrag)]
     usual = len(drags) == 1 and drags[0].rotational and not is_permeable(drags)
     if not usual or drags[0].law == "schiller_naumann":
         raise UsageError(
-            "PairResistance is what two bodies add to the drag of each in slow flow: give one "
-            'StokesDrag beside it, of the law "stokes" or "shape", with rotational = true and '
-            "without permeability"
+            "PairResistance adds the interaction of two bodies to the drag of each: give one "
+            'StokesDrag with it, with law "stokes" or "shape", rotational = true and no '
+            "permeability"
         )
     return found[0]
 
@@ -182,8 +181,8 @@ def refuse_pair_resistance(forces: Iterable[Force], subject: str) -> None:
     """Raise UsageError if there is a pair resistance, which ``subject`` does not support."""
     if any(isinstance(force, PairResistance) for force in forces):
         raise UsageError(
-            f"PairResistance is of two bodies, and {subject} cannot have it: of many its sum over "
-            "pairs would not be positive; leave it out"
+            f"PairResistance is for two bodies, and {subject} cannot have it: summed over the "
+            "pairs of many bodies, the resistance would not be positive definite; leave it out"
         )
 
 
@@ -202,7 +201,7 @@ def pair_resistance_tables(
         refuse_pair_resistance([force], f"a System of {len(bodies)} bodies")
     if any(body.fixed for body in bodies):
         raise UsageError(
-            "PairResistance is of two free bodies, and one is fixed: free it, or leave "
+            "PairResistance needs two free bodies, but one is fixed: free it, or leave "
             "PairResistance out"
         )
     first, second = radii = [drag_radius(forces, body) for body in bodies]
@@ -210,8 +209,8 @@ def pair_resistance_tables(
     mean = 0.5 * (first + second)
     if not pair.NEAREST * mean <= force.h_min <= 0.1 * mean:
         raise UsageError(
-            f"h_min of PairResistance must be {pair.NEAREST:g} to .1 of the mean radius of "
-            f"two bodies, {mean:.3g} m, found {force.h_min:g} m"
+            f"h_min of PairResistance must be {pair.NEAREST:g} to 0.1 times the mean radius of "
+            f"both bodies, {mean:.3g} m, found {force.h_min:g} m"
         )
     # Two spheres have the gap that the tables are made for: near_cut is 0.
     spheres = all(len(body.shape.vertices) == 1 for body in bodies)
@@ -237,8 +236,8 @@ def unit_table(ratio: float) -> Any:
     """Return ``Scene.pair_table`` for a mean radius and a viscosity of 1; ``ratio`` = r₂/r₁."""
     if not 1.0 / pair.LARGEST_RATIO <= ratio * (1.0 + 1e-9) <= 1.0001 * 50.0:
         raise UsageError(
-            f"the radii of two bodies with PairResistance must be up to "
-            f"{pair.LARGEST_RATIO:g} times each other, found {max(ratio, 1.0 / ratio):.4g}"
+            f"PairResistance needs radii whose ratio is at most {pair.LARGEST_RATIO:g}, found "
+            f"{max(ratio, 1.0 / ratio):.4g}"
         )
     # Lagrange interpolation between tabulated ratios of radii.
     values = sum(weight * stored_node(place) for place, weight in pair.interpolation_weights(ratio))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from flocsim.errors import plural
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.shape_library import MEASURE_COLUMNS, ShapeEntry, scaled_measures
@@ -29,10 +30,6 @@ SHARES = (0.1, 0.5, 0.9)
 NAN = math.nan
 FEWEST = 3
 """Flocs of different sizes from which on a slope has an error."""
-
-
-def plural(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def picture_line(name: str, found: Segmentation) -> str:

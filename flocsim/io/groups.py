@@ -340,8 +340,8 @@ class FileFormat:
         raises a version adds what makes a file of before one of now.
         """
         if file.kind != self.name:
-            other = file.kind or "file of another kind"
-            raise FileError(f"{path} holds a {other}: name a file with {self.title}")
+            other = f'a "{file.kind}" file' if file.kind else "a file of another kind"
+            raise FileError(f"{path} is {other}: name a file with {self.title}")
         found = file.attributes.get("schema_version")
         if found not in range(self.oldest or self.version, self.version + 1):
             raise FileError(

@@ -156,5 +156,5 @@ def test_what_asks_for_angles_has_no_stability_ratio():
         def kernel(view):
             return 0.0
 
-    with pytest.raises(UsageError, match="asks how bodies are turned"):
+    with pytest.raises(UsageError, match="depends on the angles of the bodies"):
         stability_ratio([Dipoles()], SMALL)

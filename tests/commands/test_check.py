@@ -31,7 +31,7 @@ def test_every_combination_of_ends_is_run_and_judged(folder, capsys, types):
     found = [row.split() for row in rows]
     assert {(row[0], row[3]) for row in found} == set(product(types, ("1e-09", "1e-11")))
     assert len(rows) == 2 * len(types) and all(
-        row.endswith(("right", "stated error")) for row in rows
+        row.endswith(("tolerance", "stated error")) for row in rows
     )
     for row in found:
         steps, error, stated = int(row[7]), float(row[9]), float(row[10])
@@ -66,7 +66,7 @@ def test_an_error_beyond_the_tolerance_must_be_within_what_is_stated():
     assert verdict(1e-9) == (check.RIGHT, "")
     assert verdict(1e-8, 2e-8) == (check.STATED, "")
     assert verdict(1e-8, 5e-9, 1e-9) == (
-        check.WRONG, "off by 1e-08 m, the reference by at most 1e-09 m",
+        check.WRONG, "error 1e-08 m, of the reference at most 1e-09 m",
     )  # fmt: skip
 
 

@@ -184,7 +184,7 @@ def test_masks_among_pictures_are_left_out_in_a_line_each(tmp_path, frame, capsy
     assert run(frame, *options) == 0
     lines = capsys.readouterr().err.splitlines()
     for line, name in zip(lines, ("a_labels.tif", "a_mask.png"), strict=True):
-        assert f"{name}: holds masks or labels, left out: fit them with --masks" in line
+        assert f"{name}: was left out, as it holds masks or labels: give --masks" in line
     assert {entry.image for entry in read_library(tmp_path / "s.h5")} == {"a.png"}
     assert code_of(frame / "a_mask.png", *options, "--overwrite") == 2
 
@@ -375,7 +375,7 @@ def test_wrong_values_are_named(frame, capsys, option, value):
 
 
 def test_the_pixel_size_is_needed(tmp_path, frame):
-    with pytest.raises(UsageError, match="does not give the size of a pixel"):
+    with pytest.raises(UsageError, match="does not state the size of a pixel"):
         run(frame, "-o", tmp_path / "s.h5")
 
 
@@ -455,7 +455,7 @@ def test_both_ends_of_bands_are_fitted_on_request(tmp_path, frame, capsys):
         assert sizes == sorted(sizes)
         assert sizes[0] / 1e-6 == pytest.approx(banded.radius_low, rel=0.05)
     capsys.readouterr()
-    with pytest.raises(UsageError, match="--band excludes --masks"):
+    with pytest.raises(UsageError, match="--band excludes --holes, and --masks"):
         run(frame, *options, "--band", "--masks", "-o", tmp_path / "c.h5")
 
 

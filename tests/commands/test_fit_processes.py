@@ -82,7 +82,7 @@ def test_a_picture_that_kills_its_process_is_lost_and_no_other(folder, spoil, ca
     assert ids() == ["a.png#1", "c.png#1"]
     errors = capsys.readouterr().err.splitlines()
     assert len(errors) == 2 and "b.png was not fitted: its process was killed" in errors[0]
-    assert errors[1] == "flocsim: lost: b.png; all else was written"
+    assert errors[1] == "flocsim: not fitted: b.png; everything else was written"
     assert "b.png" not in (folder / "s.csv").read_text()
     assert multiprocessing.active_children() == []
 

@@ -91,8 +91,11 @@ def test_its_files_are_shown(home, words, told):
 @pytest.mark.parametrize(
     ("words", "why"),
     [
-        ("compare a.h5 a.h5", "holds a flocsim lone: name a file of flocsim results or"),
-        ("export matrix a.h5", "holds a flocsim lone: name a file with results"),
+        (
+            "compare a.h5 a.h5",
+            ": name a file with results of a collision ensemble or",
+        ),
+        ("export matrix a.h5", 'is a "flocsim lone" file: name a file with results'),
         ("plot a.h5 --animation a.gif", "--animation is for results of a swarm study"),
         ("kernel s.toml", 's.toml has scene.kind = "lone"'),
     ],
@@ -106,9 +109,9 @@ def test_what_it_cannot_do_is_refused_in_one_line(home, words, why):
 def test_it_is_extended_by_processes_and_run_by_a_script(home):
     shutil.copy(home / "a.h5", home / "more.h5")
     code, said = run(home, "ensemble s.toml --replicates 6 -o more.h5 --resume")
-    assert code == 0 and "12 replicates, 4 of them run" in said
+    assert code == 0 and "12 replicates, of which 4 were run" in said
     code, said = run(home, "ensemble s.toml --replicates 6 --jobs 2 -o whole.h5")
-    assert code == 0 and "12 replicates, 12 of them run" in said
+    assert code == 0 and "12 replicates, of which 12 were run" in said
     assert flocs(home, "more.h5") == flocs(home, "whole.h5") != flocs(home, "a.h5")
     script = "import flocsim; flocsim.Study('s.toml').run(output='script.h5')"
     with python(home, "-c", script) as process:

@@ -35,7 +35,7 @@ def test_a_run_prints_its_table_and_writes_its_file(folder, capsys):
     lines = output.splitlines()
     assert lines[0].startswith("12 replicates: 2 types x 1 vertex count x 2 displacements")
     assert "type I: r_i = 16.41 µm, r_j = 23.02 µm" in lines
-    assert lines[-1].startswith("small.h5: 12 replicates, 12 of them run in ")
+    assert lines[-1].startswith("small.h5: 12 replicates, of which 12 were run now, in ")
     assert read_results(folder / "small.h5").replicates["outcome"].shape == (2, 1, 2, 3)
 
 

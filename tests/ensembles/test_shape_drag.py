@@ -39,12 +39,12 @@ def test_settling_pairs_are_refused(tmp_path):
 
 def test_thermal_motion_is_refused(tmp_path):
     more = '[forces.thermal]\n[integrator]\nname = "overdamped"'
-    with pytest.raises(UsageError, match='thermal motion cannot have the drag law "shape"'):
+    with pytest.raises(UsageError, match='Thermal cannot be combined with the drag law "shape"'):
         check_study(written(tmp_path, 'meeting = "brownian"', more))
 
 
 def test_a_spin_without_drag_is_refused(tmp_path):
-    with pytest.raises(FlocsimError, match='rotational must be true where law is "shape"'):
+    with pytest.raises(FlocsimError, match='rotational must be true if law is "shape"'):
         written(tmp_path, 'meeting = "shear"\nrate = "10 1/s"', "rotational = false")
 
 

@@ -26,5 +26,5 @@ def test_more_than_two_bodies_have_one_potential():
     bodies = [Body(Sphere(1e-6), (4e-6 * i, 0.0), density=2650.0) for i in range(3)]
     force = DoubleLayer(potential=(0.01, 0.02))
     System(bodies[:2], [force])
-    with pytest.raises(UsageError, match="of two unlike bodies, found 3 bodies"):
+    with pytest.raises(UsageError, match="is for two bodies, found 3 bodies"):
         System(bodies, [force])

@@ -246,7 +246,7 @@ def spheres(*radii, **words):
 @pytest.mark.parametrize(
     ("bodies", "more", "words"),
     [
-        (spheres(5e-6, 5e-6), [StokesDrag(), Lubrication()], "Lubrication is a part of"),
+        (spheres(5e-6, 5e-6), [StokesDrag(), Lubrication()], "Lubrication is part of"),
         (spheres(5e-6, 5e-6), [StokesDrag(), Thermal(temperature=300.0)], "thermal kicks do not"),
         (spheres(5e-6, 5e-6), [], "give one StokesDrag beside it"),
         (spheres(5e-6, 5e-6), [StokesDrag(law="schiller_naumann")], "in slow flow"),
@@ -255,7 +255,7 @@ def spheres(*radii, **words):
         (spheres(5e-6, 300e-6), [StokesDrag()], "up to 50 times each other, found 60"),
         (spheres(20e-3, 20e-3), [StokesDrag()], "h_min of PairResistance must be"),
         (spheres(5e-6, 5e-6, 5e-6), [StokesDrag()], "a System of 3 bodies cannot"),
-        (spheres(5e-6, 5e-6), [StokesDrag(), PairResistance()], "one PairResistance at most"),
+        (spheres(5e-6, 5e-6), [StokesDrag(), PairResistance()], "only one PairResistance"),
     ],
 )
 def test_what_it_does_not_go_with_is_refused(bodies, more, words):

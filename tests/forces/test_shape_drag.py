@@ -191,12 +191,12 @@ def test_sizes_alike_but_of_other_shapes_settle_apart():
     bodies = [body_of(HOOK), body_of(TWO_TO_ONE.scaled(radius), position=(1e-4, 0.0))]
     speeds = [each.speed for each in all_settled(system_of(*bodies))]
     assert len(speeds) == 2 and abs(speeds[0] / speeds[1] - 1.0) > 0.005
-    assert "of each body's own outline" in system_of(*bodies).explain()
+    assert "depends on the outline of each body" in system_of(*bodies).explain()
 
 
 def test_what_cannot_be_is_refused():
-    with pytest.raises(RangeError, match='rotational must be true where law is "shape"'):
+    with pytest.raises(RangeError, match='rotational must be true if law is "shape"'):
         StokesDrag(law="shape", rotational=False)
     system = System([body_of(HOOK)], [DRAG, Thermal()], fluid=WATER)
-    with pytest.raises(UsageError, match='thermal motion cannot have the drag law "shape"'):
+    with pytest.raises(UsageError, match='Thermal cannot be combined with the drag law "shape"'):
         system.scene(jit=False)

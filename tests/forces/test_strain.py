@@ -135,11 +135,11 @@ def test_where_nothing_is_strained_it_is_left_out_and_said():
     for flow in (Fluid(), Fluid(gradient=(0.0, -2.0, 2.0, 0.0)), Fluid(velocity=(1e-3, 0.0))):
         assert DRAG.kernel_in(flow) is StokesDrag().kernel_in(flow)
         text = System([Body(THREE_TO_ONE, density=2650.0)], [DRAG], fluid=flow).explain()
-        assert "no strain in this flow: left out" in text
+        assert "this flow has no strain: left out" in text
     text = System([Body(THREE_TO_ONE, density=2650.0)], [DRAG], fluid=FLOW).explain()
-    assert "long bodies turned by strain" in text
+    assert "strain rotates long bodies" in text
 
 
 def test_strain_is_a_part_of_the_torque():
-    with pytest.raises(RangeError, match="strain must be false where rotational is"):
+    with pytest.raises(RangeError, match="strain must be false if rotational is"):
         StokesDrag(rotational=False, strain=True)

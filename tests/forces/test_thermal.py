@@ -99,9 +99,9 @@ def test_what_does_not_balance_is_said():
 
 def test_explain_says_how_long_kicks_are():
     text = System(spheres(1e-6), [StokesDrag(), Thermal(kick="1 ms")], fluid=WATER).explain()
-    assert "steps end at kicks of 0.001 s" in text
+    assert "a kick lasts 0.001 s" in text
     text = System(spheres(1e-6, 1e-6), [StokesDrag(), ROOM], fluid=WATER).explain()
-    assert "halved near contact down to ways of 1e-09 m" in text
+    assert "near contact, down to displacements of 1e-09 m" in text
 
 
 def squares(kick_over_relaxation, kicks, seed):

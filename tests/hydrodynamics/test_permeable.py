@@ -86,7 +86,7 @@ def test_a_permeable_doublet_is_one_of_smaller_spheres():
 
 
 def test_refusals():
-    with pytest.raises(RangeError, match='permeability must be 0 where law is "shape"'):
+    with pytest.raises(RangeError, match='permeability must be 0 if law is "shape"'):
         StokesDrag(law="shape", permeability=1e-12)
     drag, bodies = StokesDrag(permeability=1e-12), [
         Body(Sphere(R), (3.0 * R * each, 0.0), density=1100.0) for each in range(2)

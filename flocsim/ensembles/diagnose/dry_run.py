@@ -16,6 +16,7 @@ from flocsim.ensembles.diagnose.pilot import forecast_of
 from flocsim.ensembles.diagnose.preflight import study_warnings, warning_lines
 from flocsim.ensembles.diagnose.spheres import settling_facts, sphere_facts
 from flocsim.ensembles.kind import study_of
+from flocsim.errors import plural
 from flocsim.explain import force_lines, scale_lines
 from flocsim.io.results.run_group import class_words, sphere_words
 from flocsim.io.results.schema import OUTCOMES
@@ -46,7 +47,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False, verbose: bool = Fal
     return "\n".join([*lines, f"{ran} (--dry-run){'' if verbose else VERBOSE}"])
 
 
-UNKNOWN_TIME = "time: not known; --pilot runs some replicates for some seconds to estimate it"
+UNKNOWN_TIME = "time: not known; --pilot runs replicates for a few seconds to estimate it"
 VERBOSE = "; --verbose shows collisions, forces and time scales"
 
 
@@ -66,12 +67,12 @@ def study_lines(config: Config, ranks: int) -> list[str]:
     elif shapes.own is None:
         flocs += [f"spheroradius {1e6 * shapes.radius:.4g} um"]
     flocs += [f"outlines {shapes.outlines}"] if shapes.outlines != CUT else []
-    flocs += ["pairs alike in error"] if shapes.pairs_alike_in == "error" else []
+    flocs += ["pairs with similar fit errors"] if shapes.pairs_alike_in == "error" else []
     accuracy = f"tolerance {method.tolerance:g} m" if method.tolerance < math.inf else "fixed step"
     total, vertices = count * config.replicates, ", ".join(map(str, shapes.vertices))
     return [
         f"{total} pairs: {count} conditions of {config.replicates} replicates, seed {config.seed}, "
-        f"on {ranks} rank{'s' * (ranks != 1)}; results in {config.output.file}",
+        f"on {plural(ranks, 'rank')}; results in {config.output.file}",
         f"  conditions: types {', '.join(scene.names)}; N = {vertices}; {meeting}",
         f"  flocs: {', '.join(flocs)}",
         *([f"  {words}"] if (words := config.fluid.words) else []),
@@ -85,11 +86,11 @@ def checked_words(config: Config) -> str:
     exact, share = exact_method(config.integrator.method), config.integrator.check_share
     count = 0 if exact is None else count_checks(config.seed, config.replicates, share)
     if exact is None or not count:
-        return "not known, as no replicate is run again (integrator.check_share)"
+        return "not known, because no replicate is run again (see integrator.check_share)"
     finer = exact.tolerance < math.inf
     how = f"tolerance of {exact.tolerance:g} m" if finer else f"step of {exact.first_step:g} s"
     least = "at least " * (share == "auto")
-    return f"from {least}{count} re-runs in each condition, at a {how}"
+    return f"from {least}{plural(count, 're-run')} of each condition, with a {how}"
 
 
 def collision_lines(config: Config, flocs: Sequence[Floc]) -> Iterator[str]:
@@ -102,7 +103,7 @@ def collision_lines(config: Config, flocs: Sequence[Floc]) -> Iterator[str]:
     for pairing, (name, pair) in zip(found, sphere_pairs(config, flocs), strict=True):
         radius_i, radius_j = (1e6 * shape.equivalent_radius for shape in pair.shapes)
         sizes = f"{name}: r_i = {radius_i:.4g} um, r_j = {radius_j:.4g} um"
-        turn = "" if name in thermal else f"; turn time {pair.turn_time:.3g} s"
+        turn = "" if name in thermal else f"; passing time {pair.turn_time:.3g} s"
         yield f"{sizes}, D_0 = {1e6 * pair.zone_distance:.4g} um{turn}"
         if name in thermal:
             yield f"  {sphere_words(thermal[name])}"
@@ -128,14 +129,14 @@ def pilot_lines(config: Config, ranks: int) -> list[str]:
     except MemoryError:
         raise
     except Exception as error:  # a class of the user's own may raise anything
-        return [f"time: not known, as the pilot failed: {' '.join(str(error).split())}"]
+        return [f"time: not known, because the pilot failed: {' '.join(str(error).split())}"]
     words = ", ".join(f"{found.ended[name]} {name}" for name in OUTCOMES if found.ended[name])
     most = f" at {found.replicates} replicates of a condition"
     hours = [each / 3600.0 for each in (found.cpu, found.low, found.high)]
     return [
-        f"time: {duration(found.cpu / ranks)} on {ranks} rank{'s' * (ranks != 1)}, and some tens "
-        "of seconds where code is compiled first",
+        f"time: {duration(found.cpu / ranks)} on {plural(ranks, 'rank')}, plus up to a minute if "
+        "code must be compiled first",
         f"  core-hours{most * (found.replicates < config.replicates)}: {hours[0]:.2g} "
-        f"({hours[1]:.2g} to {hours[2]:.2g}), by a pilot of {found.ended.total()} replicates, "
-        f"which ended {words}",
+        f"({hours[1]:.2g} to {hours[2]:.2g}), estimated from "
+        f"{plural(found.ended.total(), 'replicate')}, which ended: {words}",
     ]

@@ -18,7 +18,7 @@ import numpy as np
 from flocsim.ensembles.kind import MOST_ROWS, Chunk, Interval, StudyKind, missing, total
 from flocsim.ensembles.parallel.communicator import ChunkResult, Kept
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.errors import FlocsimError
+from flocsim.errors import FlocsimError, plural
 from flocsim.io.results.run_group import describe_note
 
 SHORTEST_SECONDS = 0.25
@@ -192,9 +192,8 @@ class StudyState:
         if self.failed > self.study.allowed:
             notes = self.store.notes
             raise TooManyFailures(
-                f"{self.failed} replicate{'s' if self.failed > 1 else ''} failed, more than "
-                "stop.failed allows; the first: "
-                f"{describe_note(notes[0]) if notes else 'see the journal'}"
+                f"{plural(self.failed, 'replicate')} failed, more than stop.failed allows; the "
+                f"first: {describe_note(notes[0]) if notes else 'see the journal'}"
             )
         self.look_at_stages()
 

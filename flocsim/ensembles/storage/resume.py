@@ -16,7 +16,7 @@ from flocsim.ensembles.config import contents_of
 from flocsim.ensembles.kind import OldResults, StudyKind, layout
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import RowStore, sessions_of
-from flocsim.errors import FileError, FlocsimError, UsageError
+from flocsim.errors import FileError, FlocsimError, UsageError, plural
 from flocsim.io.files import Rule, ordinary_target, set_aside
 from flocsim.io.groups import UNREADABLE
 from flocsim.io.journal import DAMAGED, ROWS, SESSION, Journal, as_text, journal_path
@@ -199,9 +199,9 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
         journal.discard(table, "id=?", number)
     if count := len(store.refused) + journal.lost:
         start.remarks.append(
-            f"{journal.path}: {count} damaged or missing record{'s' * (count != 1)} (the end of "
-            f"its -wal file may be missing): the {store.there()} finished replicates that are "
-            "intact are used, what is missing is computed again"
+            f"{journal.path}: {plural(count, 'damaged or missing record')} (the end of its -wal "
+            f"file may be missing): {plural(store.there(), 'intact replicate')} will be used, and "
+            "the missing ones computed again"
         )
 
 
@@ -214,8 +214,8 @@ def refuse_fewer(start: Beginning, output: str | Path, replicates: int) -> None:
     if left_out or old.count > replicates:
         raise UsageError(
             f"{output} has rows that this run does not ask for ({old.count} replicates of each "
-            f"condition, and {len(left_out)} conditions more), and lacks others: ask for all of "
-            "them together, or name another output"
+            f"condition, and {plural(len(left_out), 'more condition')}), but lacks others: ask for "
+            "all of them together, or name another output"
         )
     start.at_least = old.count
 

@@ -32,7 +32,7 @@ from flocsim.ensembles.swarms.results import (
     moment_name,
 )
 from flocsim.ensembles.swarms.scene import SwarmScene
-from flocsim.errors import UsageError
+from flocsim.errors import UsageError, plural
 from flocsim.explain import force_lines, scale_lines
 from flocsim.forces.settling import terminal_motion
 from flocsim.geometry.shapes.cores import table_of
@@ -161,8 +161,9 @@ class SwarmStudy(StudyKind):
 
     @property
     def title(self) -> str:
-        number, duration = self.scene.number, self.scene.duration
-        return f"{self.config.replicates} swarms of {number} bodies, {duration:g} s"
+        bodies = plural(self.scene.number, "body", "bodies")
+        swarms = plural(self.config.replicates, "swarm")
+        return f"{swarms} of {bodies}, {self.scene.duration:g} s"
 
     def asked(self) -> dict[str, Any]:
         """Return what the study consists of, and what its snapshots are like."""
@@ -296,7 +297,7 @@ class SwarmStudy(StudyKind):
 
         def look(tried: int) -> bool:
             if going is not None:
-                going(f"swarm {replicate} at {progress.time:.4g} s, {tried} steps on")
+                going(f"swarm {replicate} at {progress.time:.4g} s, {tried} steps further")
             return halted()
 
         scene, stops = self.scene, self.stops
@@ -497,14 +498,14 @@ def dry_run(config: Config, ranks: int, pilot: bool = False, verbose: bool = Fal
     largest, speed = settled(pair, pair.bodies[0]), ""
     if largest is not None:
         speed = (
-            f", {1e3 * largest.speed:.4g} mm/s alone for the largest, of Re = "
+            f"; the largest settles alone at {1e3 * largest.speed:.4g} mm/s, Re = "
             f"{largest.reynolds:.2g}, St = {largest.stokes:.2g}"
         )
     size = config.replicates * study.pieces * len(swarm.bodies) * BODY_BYTES
     lines = [
-        f"{config.replicates} swarm{'s' * (config.replicates != 1)} of {scene.number} bodies, "
-        f"N = {study.vertices}, seed {config.seed}, on {ranks} rank{'s' * (ranks != 1)}; results "
-        f"in {config.output.file}",
+        f"{plural(config.replicates, 'swarm')} of {plural(scene.number, 'body', 'bodies')}, "
+        f"N = {study.vertices}, seed {config.seed}, on {plural(ranks, 'rank')}; results in "
+        f"{config.output.file}",
         f"  r_eq {radii.min():.4g} to {radii.max():.4g} um, median {np.median(radii):.4g}",
         f"  box {width:.5g} x {height:.5g} um, periodic: {scene.periodic}"
         f"{', with a floor' if scene.floor else ''}; bodies cover {area / (width * height):.4f}",

@@ -85,7 +85,7 @@ def test_a_method_without_tolerance_and_step_is_not_checked(tmp_path):
 def test_the_dry_run_says_how_many_and_at_what(tmp_path):
     config = small_config(tmp_path, {"replicates": 1000, "shapes": {"vertices": (1,)}})
     words = checked_words(config)
-    assert f"{count_checks(1, 1000, 'auto')} re-runs in each condition" in words
+    assert f"{count_checks(1, 1000, 'auto')} re-runs of each condition" in words
     assert "1e-11 m" in words
     off = small_config(tmp_path, {"integrator": {"check_share": 0.0}})
     assert "not known" in checked_words(off)

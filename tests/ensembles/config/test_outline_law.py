@@ -39,7 +39,10 @@ class Faces(OrientedForce):
 
 @pytest.mark.parametrize(
     ("scene", "words"),
-    [("", ""), ('meeting = "extension"\nrate = 10.0', "Faces asks how bodies are turned, which")],
+    [
+        ("", ""),
+        ('meeting = "extension"\nrate = 10.0', "Faces depends on the angles of the bodies, which"),
+    ],
 )
 def test_so_do_forces_that_ask_how_bodies_are_turned(tmp_path, scene, words):
     (tmp_path / "faces_turned.py").write_text(TURNED)

@@ -17,7 +17,7 @@ def spheres(folder, **over):
 def test_the_pilot_says_what_the_study_takes(tmp_path):
     text = dry_run.dry_run(spheres(tmp_path), 2, pilot=True)
     assert re.search(r"time: \d+.* on 2 ranks", text)
-    assert re.search(r"by a pilot of (\d+) replicates, which ended \1 A", text)
+    assert re.search(r"estimated from (\d+) replicates, which ended: \1 A", text)
     [hours] = re.findall(r"core-hours: (\S+) \((\S+) to (\S+)\), by", text)
     value, low, high = map(float, hours)
     assert 0.0 < low < value < high
@@ -26,7 +26,7 @@ def test_the_pilot_says_what_the_study_takes(tmp_path):
 
 def test_without_a_pilot_nothing_is_run(tmp_path):
     text = dry_run.dry_run(spheres(tmp_path), 1)
-    assert "time: not known; --pilot runs some replicates" in text
+    assert "time: not known; --pilot runs replicates" in text
     assert "nothing was run (--dry-run); --verbose shows" in text
     # What is asked first: what would run, how long it takes, what is doubtful.
     assert text.splitlines()[0].startswith("120 pairs: 4 conditions of 30 replicates")
@@ -44,7 +44,7 @@ def test_a_machine_without_a_compiler_is_told_the_rest(folder, environment, caps
     environment["NUMBA_DISABLE_JIT"] = "1"
     assert main(["ensemble", "small.toml", "--dry-run", "--pilot"]) == 0
     printed = capsys.readouterr()
-    assert re.search("time: not known, as the pilot failed: .*NUMBA_DISABLE_JIT", printed.out)
+    assert re.search("time: not known, because the pilot failed: .*NUMBA_DISABLE_JIT", printed.out)
     assert printed.err == ""
 
 

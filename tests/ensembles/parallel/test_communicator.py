@@ -242,7 +242,7 @@ def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, in_tmp, cap
     assert "holds an unfinished run: continue it with --resume" in capsys.readouterr().err
     assert main(["ensemble", *again, "--resume"]) == 0
     # What was computed beyond the three replicates that are asked for now is not thrown away.
-    beyond = "has more rows than were asked for, and is kept"
+    beyond = "has more rows than this run needs, and is kept"
     lines = unexpected(capsys.readouterr().err)
     assert all(beyond in line for line in lines)
     assert (serial / f"late{ranks}.h5.journal").exists() == (lines != [])

@@ -96,7 +96,7 @@ def test_a_journal_with_more_than_is_asked_for_stays(
     before = rows_in(stopped / "r.h5.journal")
     ended = go_on(stopped, **fewer)
     assert ended.code == 0
-    assert "r.h5.journal has more rows than were asked for, and is kept" in capsys.readouterr().err
+    assert "r.h5.journal has more rows than this run needs, and is kept" in capsys.readouterr().err
     assert rows_in(stopped / "r.h5.journal") == before + ended.computed
     alone = tmp_path_factory.mktemp("alone")
     go_on(alone, NEW, **fewer)

@@ -225,7 +225,7 @@ def test_what_is_there_is_left_alone(finished, in_tmp, capsys):
     assert len(said) == 2 and "already exists" in said[0]
     assert "seed is 4 in the file, 9 now" in said[1]
     assert main(["swarm", "swarm.toml", "--resume"]) == 0
-    assert "2 replicates, 0 of them run" in capsys.readouterr().out
+    assert "2 replicates, of which 0 were run" in capsys.readouterr().out
     assert (finished / "swarm.h5").read_bytes() == before
 
 

@@ -167,7 +167,7 @@ def test_opposite_potentials_attract():
 
 
 def test_what_has_no_bound_takes_a_least_gap():
-    with pytest.raises(RangeError, match=r'"charge" has a pressure without bound.*give d_min'):
+    with pytest.raises(RangeError, match=r'"charge" has an infinite pressure.*give d_min'):
         layer(boundary="charge")
     with pytest.raises(RangeError, match="between unlike potentials"):
         DoubleLayer((15e-3, 30e-3), law="outline", boundary="potential")
@@ -180,5 +180,5 @@ def test_two_double_layers_and_a_cut_of_a_thick_one_are_refused():
     sphere = Sphere(DEBYE)
     with pytest.raises(UsageError, match="ends 12 Debye lengths from an outline, found a cut"):
         Pair(sphere, sphere, (5e-6, 0.0, 0.0), layer(cut=1e-6))
-    with pytest.raises(UsageError, match="one double layer acts along outlines"):
+    with pytest.raises(UsageError, match="only one double layer can act along outlines"):
         Pair(sphere, sphere, (5e-6, 0.0, 0.0), layer(), layer())

@@ -122,7 +122,9 @@ def test_two_dipoles_turn_into_line_and_no_energy_is_made(shape):
 
 def test_they_are_explained_and_refused_where_only_distances_are_known():
     words = system_of(3e-6, 0.0, 0.0).explain()
-    assert "how both bodies are turned" in words
+    assert "the angles of both bodies" in words
     bodies = [Body(Sphere(1e-6), density=2000.0), Body(Sphere(1e-6), (1e-5, 0.0), density=2000.0)]
-    with pytest.raises(UsageError, match="Dipoles asks how bodies are turned, and a swarm has"):
+    with pytest.raises(
+        UsageError, match="Dipoles depends on the angles of the bodies, but a swarm can only have"
+    ):
         Swarm(bodies, [Dipoles(), StokesDrag()])

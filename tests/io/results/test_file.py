@@ -131,7 +131,7 @@ def test_foreign_hdf5_is_refused(tmp_path):
     with pytest.raises(FileError, match="not from flocsim"):
         read_results(path)
     path.write_bytes(seal(path.read_bytes()))
-    with pytest.raises(FileError, match="holds a file of another kind: name a file with results"):
+    with pytest.raises(FileError, match="is a file of another kind: name a file with results"):
         read_results(path)
 
 
