@@ -1,249 +1,173 @@
-"""The whole model in one short file, without flocsim: two flocs settle, meet, and stick or part.
+"""The model of a pair in one short file, without flocsim: two flocs settle, meet, stick or part.
 
-This is the pair of Tang, Alonso-Marroquín and Maggi (2014), Colloids and Surfaces; numbers in
-brackets are the equations of that paper. Read it from top to bottom: shapes, forces, motion,
-outcome, and a small study. flocsim computes the same with controlled error, and far faster.
+This is the pair of Tang, Alonso-Marroquín and Maggi (2014), "Stochastic collision and aggregation
+analysis of kaolinite in water"; numbers in brackets are its equations. Read from top to bottom:
+parameters, shapes, forces, motion and outcome, a small study. flocsim computes the same with
+controlled errors and much faster. Run it with
 
     python examples/minimal_flocsim.py
 
-A floc i settles in water. A larger floc j starts above it, catches up, and touches it. Near each
-other the two attract and repel, in contact they are stiff, sticky and damped springs, and their
-shapes decide whether they lock or roll off each other. That is counted as
+A floc i settles in still water. A heavier floc j starts above it, catches up and touches it. Their
+centres attract and repel each other, their outlines are stiff and damped springs, and their shapes
+decide whether they lock or roll off each other. The collision is of class
 
-    A  touched inside the attraction zone, stays      B  touched inside, departs
-    C  touched outside the attraction zone, stays     D  touched outside, departs
+    A  if they touch inside the attraction zone and stay together,    B  inside, and depart,
+    C  if they touch outside the attraction zone and stay together,   D  outside, and depart.
 
-SI units; gravity points to −y; angles are counter-clockwise. Points and vectors of the plane are
-complex numbers x + iy, as a turn by θ then is a product with exp(iθ).
+Units are SI, gravity points to −y, angles are counter-clockwise [rad]. Points and vectors of the
+plane are complex numbers x + iy. A turn by θ is a product with exp(iθ), and a* b, a* the complex
+conjugate, is the scalar product of two vectors plus i times their vector product. Likewise b/n has
+the parts of b along a unit vector n (real) and across it, to its left (imaginary).
 """
 
-import math
+from math import exp, hypot, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from scipy.special import lambertw
 
-# Table 1 and section 2.4 of the paper, with two of its gaps closed so that its findings appear.
-# The Debye length 1/κ is printed as 0.98 nm, at which attraction wins at every distance and there is
-# no zone; 0.98 µm is that of the distilled water used. The mass per area is not printed; the damping
-# of Table 1 implies about 2 kg/m². (Real flocs are about a hundred times lighter.)
+# --- Parameters -------------------------------------------------------------------------------
+
+# Table 1 and section 2.4 of the paper, with two gaps closed so that its findings appear. It prints
+# a Debye length 1/κ of 0.98 nm, at which attraction wins everywhere and nothing bounds a zone;
+# 0.98 µm is that of the distilled water used. It prints no mass per area; the damping in Table 1
+# implies about 2 kg/m² (a hundred times that of real flocs).
 GRAVITY = 9.81  # g [m/s²]
 VISCOSITY = 8.9e-4  # γ [Pa s]
 SURFACE_DENSITY = 2.0  # ρ_s [kg/m²]
 HAMAKER = 1.0e-18  # H_A [J]
-LEAST_GAP = 1.0e-9  # (5) diverges at contact: attraction no longer grows below this gap [m]
+LEAST_GAP = 1.0e-9  # d below which attraction no longer grows, as (5) diverges at contact [m]
 POTENTIAL = 15e-3  # φ [V]
 PERMITTIVITY = 78.5 * 8.854e-12  # ε_r ε_0 [F/m]
 KAPPA = 1.0 / 0.98e-6  # κ [1/m]
 K_N, K_T = 20.0, 2.0  # stiffness of a contact, normal and tangential [N/m]
 
-
-@njit
-def dot(a, b):
-    """Return the scalar product of two vectors."""
-    return a.real * b.real + a.imag * b.imag
-
-
-@njit
-def cross(a, b):
-    """Return the z component of the vector product of two vectors."""
-    return a.real * b.imag - a.imag * b.real
-
+# Attraction (5) and repulsion (6) balance where x² exp(−x) = S, x = κd. Of the two roots the outer
+# one, 5.92 µm, bounds the zone: two flocs touch inside it if d_c < D_0 = r_i + r_j + d_0.
+S = HAMAKER * KAPPA / (24.0 * pi * PERMITTIVITY * POTENTIAL**2)
+BALANCE_GAP = -2.0 * lambertw(-sqrt(S) / 2.0, -1).real / KAPPA  # d_0 [m]
 
 # --- Shapes -----------------------------------------------------------------------------------
 
 
 class Body(NamedTuple):
-    """A spheropolygon (1): a polygon, its core, along which a disk of radius r is swept.
+    """A spheropolygon (1): all that a disk covers whose centre is anywhere in a polygon, its core.
 
     One vertex makes a sphere. The core may have bays, but must not cross itself.
     """
 
-    vertices: np.ndarray  # corners of the core in order, from the centroid of the body [m]
-    radius: float  # spheroradius r [m]
+    vertices: np.ndarray  # corners of the core, in order, from the centroid of the body [m]
+    radius: float  # of the disk, the spheroradius [m]
     mass: float  # m = ρ_s A [kg]
     inertia: float  # ρ_s J, J the second moment of area [kg m²]
-    r_eq: float  # radius of the disk of the same area [m]
-    outer: float  # R, largest distance from the centroid to the outline [m]
+    r_eq: float  # equivalent radius, that of a disk with the same area [m]
+    outer: float  # R, the largest distance from the centroid to the outline [m]
 
 
 @njit
 def nearest_on_edge(point, start, end):
-    """Return the point of an edge, its ends included, that is nearest to another point."""
+    """Return the point of an edge, ends included, that is nearest to a point."""
     edge = end - start
-    if edge == 0.0:
-        return start
-    return start + edge * min(max(dot(point - start, edge) / dot(edge, edge), 0.0), 1.0)
+    along = ((point - start) * edge.conjugate()).real / (abs(edge) ** 2 or 1.0)
+    return start + edge * min(max(along, 0.0), 1.0)
 
 
 @njit
 def core_distance(point, vertices):
     """Return the distance of a point to the core, 0 inside."""
-    nearest, inside, start = np.inf, False, vertices[-1]
-    for end in vertices:
-        nearest = min(nearest, abs(point - nearest_on_edge(point, start, end)))
-        # Inside, a ray in the direction of x crosses an odd number of edges.
-        if (start.imag > point.imag) != (end.imag > point.imag):
-            inside ^= (cross(end - start, point - start) > 0.0) == (end.imag > start.imag)
-        start = end
-    return 0.0 if inside else nearest
+    nearest, winding = np.inf, 0.0
+    for k in range(len(vertices)):
+        nearest = min(nearest, abs(point - nearest_on_edge(point, vertices[k - 1], vertices[k])))
+        # Seen from inside, the outline goes round by 2π in all; from outside, by 0.
+        winding += np.angle((vertices[k] - point) / (vertices[k - 1] - point))
+    return 0.0 if abs(winding) > 1.0 else nearest
 
 
 def make_body(vertices, radius, cells=400):
-    """Return the Body with these core vertices, its mass by summing over cells of a fine grid."""
+    """Return the Body of a core and a radius; its moments are sums over the cells of a grid."""
     vertices = np.array(vertices, complex)
-    low = complex(vertices.real.min(), vertices.imag.min()) - 1.1 * radius * (1 + 1j)
-    width = max(np.ptp(vertices.real), np.ptp(vertices.imag)) + 2.2 * radius
-    size = width / cells
-    middles = size * (np.arange(cells) + 0.5)
-    points = (low + middles + 1j * middles[:, None]).ravel()
-    # The outline is where the core is r away; it covers part of the cells that it passes through.
-    distances = np.array([core_distance(point, vertices) for point in points])
-    covered = np.clip(0.5 + (radius - distances) / size, 0.0, 1.0)
+    reach = abs(vertices).max() + 1.1 * radius
+    x, size = np.linspace(-reach, reach, cells, retstep=True)
+    points = (x + 1j * x[:, None]).ravel()
+    distance = np.array([core_distance(point, vertices) for point in points])
+    # The outline, where the core is a radius away, covers part of the cells that it passes through.
+    covered = np.clip(0.5 + (radius - distance) / size, 0.0, 1.0)
     area = size**2 * covered.sum()
-    centroid = (covered * points).sum() / covered.sum()
-    second_moment = size**2 * (covered * abs(points - centroid) ** 2).sum()
-    vertices = vertices - centroid
+    centroid = np.average(points, weights=covered)
+    second_moment = area * np.average(abs(points - centroid) ** 2, weights=covered)
     mass, inertia = SURFACE_DENSITY * area, SURFACE_DENSITY * second_moment
-    return Body(
-        vertices, radius, mass, inertia, math.sqrt(area / math.pi), abs(vertices).max() + radius
-    )
+    outer = abs(vertices - centroid).max() + radius
+    return Body(vertices - centroid, radius, mass, inertia, sqrt(area / pi), outer)
 
 
-# --- Forces -----------------------------------------------------------------------------------
-
-
-@njit
-def reduced(a, b):
-    """Return ab/(a + b): the effective mass M of two masses, r* of two radii."""
-    return a * b / (a + b)
+# --- Forces between the two -------------------------------------------------------------------
 
 
 @njit
-def body_force(body, velocity, spin):
-    """Return weight (3) and Stokes drag (4), and the torque of the same drag on a spinning disk.
+def contact(bodies, cores, pair):
+    """Return overlap Δ, normal from i to j, and the middle of the overlap, of a vertex and an edge.
 
-    Drag is that of the equivalent sphere. The torque is not in the paper.
-    """
-    force = -1j * body.mass * GRAVITY - 6.0 * math.pi * VISCOSITY * body.r_eq * velocity
-    return force, -8.0 * math.pi * VISCOSITY * body.r_eq**3 * spin
-
-
-@njit
-def repulsion(gap, r_star):
-    """Return the double-layer repulsion (6) minus the van der Waals attraction (5) [N].
-
-    ``gap`` d is that of the equivalent spheres. Real outlines can touch while these overlap: then
-    d < 0, and either force keeps its largest value.
-    """
-    attraction = HAMAKER * r_star / (6.0 * max(gap, LEAST_GAP) ** 2)
-    layer = 4.0 * math.pi * PERMITTIVITY * KAPPA * POTENTIAL**2 * r_star
-    return layer * math.exp(-KAPPA * max(gap, 0.0)) - attraction
-
-
-def zone_distance(i, j):
-    """Return D_0, the distance of the centres below which they touch inside the attraction zone.
-
-    (5) and (6) balance where x² exp(−x) = S, x = κd. Of the two roots the outer one is taken.
-    """
-    s = HAMAKER * KAPPA / (24.0 * math.pi * PERMITTIVITY * POTENTIAL**2)
-    return i.r_eq + j.r_eq - 2.0 * lambertw(-math.sqrt(s) / 2.0, -1).real / KAPPA
-
-
-@njit
-def contact(bodies, place, turn, pair):
-    """Return the overlap Δ [m] of a vertex and an edge, its normal from i to j, and its middle.
-
-    ``pair``: (body of the vertex, vertex, edge of the other body); ``turn``: exp(iθ) of both.
+    ``cores``: vertices of both bodies where they are now; ``pair``: (body of the vertex, its
+    number, number of the edge of the other body).
     """
     one, vertex, edge = pair
-    other = 1 - one
-    core, following = bodies[other].vertices, (edge + 1) % len(bodies[other].vertices)
-    point = place[one] + turn[one] * bodies[one].vertices[vertex]
-    start, end = place[other] + turn[other] * core[edge], place[other] + turn[other] * core[following]
-    foot = nearest_on_edge(point, start, end)
-    distance = abs(point - foot)
-    normal = (point - foot) / distance
-    overlap = bodies[0].radius + bodies[1].radius - distance
-    middle = foot + normal * (bodies[other].radius - 0.5 * overlap)
+    point, core = cores[one][vertex], cores[1 - one]
+    foot = nearest_on_edge(point, core[edge - 1], core[edge])
+    normal = (point - foot) / abs(point - foot)
+    overlap = bodies[0].radius + bodies[1].radius - abs(point - foot)
+    middle = foot + (bodies[1 - one].radius - 0.5 * overlap) * normal
     return overlap, (normal if one == 1 else -normal), middle
 
 
 @njit
-def near_pairs(bodies, place, turn, reach):
-    """Return the vertex–edge pairs nearer than ``reach``, and the least gap of all pairs [m].
+def interaction(bodies, cores, place, velocity, spin, pairs, slip, h):
+    """Return the force on j (that on i is the opposite), both torques, and the deepest overlap.
 
-    All pairs, both ways round, are counted: the elastic energy is then smooth, wherever a contact
-    rolls. (At a corner up to four act at once.) A sphere has no edge, but is one for a sphere.
-    """
-    pairs, least = [(0, 0, 0) for _ in range(0)], np.inf
-    for one in range(2):
-        vertices, edges = len(bodies[one].vertices), len(bodies[1 - one].vertices)
-        if edges == 1 and (vertices > 1 or one == 1):
-            continue
-        for vertex in range(vertices):
-            for edge in range(edges):
-                gap = -contact(bodies, place, turn, (one, vertex, edge))[0]
-                least = min(least, gap)
-                if gap < reach:
-                    pairs.append((one, vertex, edge))
-    return pairs, least
-
-
-@njit
-def hand_on(bodies, place, turn, pairs, slip, opened):
-    """Hand the tangential displacement of a pair that has opened on to the closed one beside it.
-
-    As flocs roll, the pair that carries a contact changes, and the tangential force must not jump.
-    The elastic energy must not grow, either. With no closed pair within r_i + r_j it is lost.
-    """
-    here = contact(bodies, place, turn, opened)[2]
-    heir, nearest = opened, bodies[0].radius + bodies[1].radius
-    for pair in pairs:
-        overlap, _, middle = contact(bodies, place, turn, pair)
-        if overlap > 0.0 and abs(middle - here) < nearest:
-            heir, nearest = pair, abs(middle - here)
-    most = math.hypot(slip[opened], slip[heir])
-    slip[heir] = min(max(slip[opened] + slip[heir], -most), most)
-    slip[opened] = 0.0
-
-
-@njit
-def forces(bodies, place, turn, velocity, spin, pairs, slip, h):
-    """Return forces and torques on both bodies, and the largest overlap of their outlines.
-
-    ``slip``: the tangential displacement ξ of every pair [m], carried on here by a time h.
+    ``pairs``: all pairs of a vertex and an edge that may touch; ``slip``: their tangential elastic
+    displacements ξ [m], by pair, which are advanced by a step h.
     """
     i, j = bodies
-    force, torque, deepest = np.zeros(2, np.complex128), np.zeros(2), -np.inf
-    for k in range(2):
-        force[k], torque[k] = body_force(bodies[k], velocity[k], spin[k])
+    # Van der Waals attraction (5) and double-layer repulsion (6) along the line of centres. Their d
+    # is the gap of the equivalent spheres; r* = r_i r_j/(r_i + r_j). Where outlines interlock these
+    # spheres overlap: then d < 0, and both forces keep their values at contact.
+    apart, r_star = place[1] - place[0], i.r_eq * j.r_eq / (i.r_eq + j.r_eq)
+    d = abs(apart) - i.r_eq - j.r_eq
+    attraction = HAMAKER * r_star / (6.0 * max(d, LEAST_GAP) ** 2)
+    strength = 4.0 * pi * PERMITTIVITY * KAPPA * POTENTIAL**2 * r_star
+    repulsion = strength * exp(-KAPPA * max(d, 0.0))
+    force, torque = (repulsion - attraction) * apart / abs(apart), np.zeros(2)
 
-    # (5) and (6) act along the line of centres, and fade within 1 nm of coinciding centres.
-    apart = place[1] - place[0]
-    distance = math.hypot(abs(apart), 1e-9)
-    push = repulsion(distance - i.r_eq - j.r_eq, reduced(i.r_eq, j.r_eq)) * apart / distance
-    force[0], force[1] = force[0] - push, force[1] + push
-
-    # (7) and (8) at every contact. Critical damping: λ_n = 2 √(k_n/M), and λ_t/λ_n = k_t/k_n.
-    damping_n = 2.0 * math.sqrt(K_N * reduced(i.mass, j.mass))  # M λ_n [kg/s]
-    damping_t = damping_n * K_T / K_N
+    # Damping M λ_n is critical, λ_n = 2 √(k_n/M), M = m_i m_j/(m_i + m_j); λ_t/λ_n = k_t/k_n.
+    deepest, damping = -np.inf, 2.0 * sqrt(K_N * i.mass * j.mass / (i.mass + j.mass))
     for pair in pairs:
-        overlap, normal, middle = contact(bodies, place, turn, pair)
+        overlap, normal, middle = contact(bodies, cores, pair)
         deepest = max(deepest, overlap)
-        if overlap <= 0.0:
-            if slip[pair] != 0.0:
-                hand_on(bodies, place, turn, pairs, slip, pair)
-            continue
-        arm_i, arm_j, tangent = middle - place[0], middle - place[1], 1j * normal
-        sliding = velocity[1] + 1j * spin[1] * arm_j - velocity[0] - 1j * spin[0] * arm_i
-        v_n, v_t = dot(sliding, normal), dot(sliding, tangent)
-        slip[pair] += h * v_t  # no sliding: ξ is the integral of v_t while the contact lasts
-        push = (K_N * overlap - damping_n * v_n) * normal
-        push -= (K_T * slip[pair] + damping_t * v_t) * tangent
-        force[0], force[1] = force[0] - push, force[1] + push
-        torque[0], torque[1] = torque[0] - cross(arm_i, push), torque[1] + cross(arm_j, push)
+        if overlap > 0.0:
+            # The velocity of j against i at the contact: v_n and v_t are its parts.
+            arms = middle - place
+            velocities = velocity + 1j * spin * arms
+            v = (velocities[1] - velocities[0]) / normal
+            # No sliding: ξ is the integral of v_t for as long as the contact lasts.
+            slip[pair] += h * v.imag
+            # Elastic (7) and viscous (8) forces. They may pull: critical damping needs that.
+            push = K_N * overlap - damping * v.real
+            shear = -K_T * slip[pair] - damping * K_T / K_N * v.imag
+            on_j = (push + 1j * shear) * normal
+            force += on_j
+            torque += np.array([-1.0, 1.0]) * (np.conj(arms) * on_j).imag
+        elif slip[pair] != 0.0:
+            # The pair has opened. As bodies roll, pair after pair carries the same contact,
+            # whose tangential force must not jump: the nearest closed pair within r_i + r_j takes
+            # over ξ, as far as elastic energy does not grow. Without an heir ξ is lost.
+            heir, nearest = pair, i.radius + j.radius
+            for other in pairs:
+                closed, _, there = contact(bodies, cores, other)
+                if closed > 0.0 and abs(there - middle) < nearest:
+                    heir, nearest = other, abs(there - middle)
+            most = hypot(slip[pair], slip[heir])
+            slip[heir] = min(max(slip[pair] + slip[heir], -most), most)
+            slip[pair] = 0.0
     return force, torque, deepest
 
 
@@ -251,81 +175,94 @@ def forces(bodies, place, turn, velocity, spin, pairs, slip, h):
 
 
 @njit
-def settling_speed(body):
-    """Return the speed at which (3) and (4) balance [m/s]."""
-    return body.mass * GRAVITY / (6.0 * math.pi * VISCOSITY * body.r_eq)
+def encounter(i, j, place, angle, fineness=0.05):
+    """Return the class A to D, or missed, undecided or failed, and d_c at the first touch [m].
 
-
-@njit
-def encounter(bodies, place, angle, velocity, spin, fineness=0.02):
-    """Follow two bodies until their fate is known; return (fate, d_c at the touch or NaN).
-
-    Places, angles, velocities and spins are arrays of two, and are changed. Steps are leapfrog,
-    which is velocity Verlet with velocities half a step behind; ``fineness`` is the step in contact,
-    over 1/ω_0 = √(M/k_n), and must be well below 1.
+    From ``place`` and ``angle`` both start at settling velocity, without spin. Steps are leapfrog
+    (velocity Verlet with velocities half a step behind), in contact of ``fineness``/ω_0,
+    ω_0 = √(k_n/M): well below 1.
     """
-    i, j = bodies
-    size, least_outer = i.r_eq + j.r_eq, min(i.outer, j.outer)
-    mass = reduced(i.mass, j.mass)
-    fine = fineness * math.sqrt(mass / K_N)
-    # Velocities relax within m/(6πγ r_eq) = v/g. A doublet turns within about size/drift.
-    relaxation, drift = settling_speed(j) / GRAVITY, settling_speed(j) - settling_speed(i)
-    rest_time = 3.0 * max(size / drift, relaxation)
-    limit = 100.0 * rest_time
+    bodies, place, angle = (i, j), place.copy(), angle.copy()
+    mass, inertia = np.array([i.mass, j.mass]), np.array([i.inertia, j.inertia])
+    r_eq, outer = np.array([i.r_eq, j.r_eq]), np.array([i.outer, j.outer])
+    # Stokes drag (4) of the equivalent spheres, and their torque, which the paper does not have.
+    drag, spin_drag = 6.0 * pi * VISCOSITY * r_eq, 8.0 * pi * VISCOSITY * r_eq**3
+    velocity, spin = -1j * mass * GRAVITY / drag, np.zeros(2)
+    # A doublet swings round within about size/drift, damped within m/(6πγ r_eq).
+    size, relaxation, drift = r_eq.sum(), (mass / drag).max(), abs(velocity[1] - velocity[0])
+    rest_time, zone = 3.0 * max(size / drift, relaxation), size + BALANCE_GAP
 
-    most = max(len(i.vertices), len(j.vertices))
-    slip = np.zeros((2, most, most))  # ξ of every vertex–edge pair [m]
-    skin = 1e-6  # pairs nearer than this are listed, until the bodies have moved so far
-    pairs, gap = near_pairs(bodies, place, np.exp(1j * angle), skin)
-    time, path, touch = 0.0, 0.0, math.nan
-    rest_pose, rest_angle, rest_since = 0j, 0.0, 0.0
-    while time < limit:
-        speed = abs(velocity[1] - velocity[0]) + i.outer * abs(spin[0]) + j.outer * abs(spin[1])
-        # Far from each other steps are long, but cover half of the gap at most.
-        h = fine if len(pairs) > 0 else min(0.5 * gap / speed, 0.01 * relaxation)
+    # Each vertex of one with each edge of the other, both ways round: the elastic energy then is
+    # smooth wherever a contact rolls (at a corner up to four pairs act at once). A sphere has no
+    # edge: two spheres have one pair, their vertices.
+    n, m = (len(i.vertices), len(j.vertices)), (len(j.vertices), len(i.vertices))
+    pairs = [(k, v, e) for k in (0, 1) for v in range(n[k]) for e in range(m[k]) if m[k] > 1]
+    if len(pairs) == 0:
+        pairs.append((0, 0, 0))
+    slip = np.zeros((2, max(n), max(n)))
+    h = fineness * sqrt(i.mass * j.mass / (i.mass + j.mass) / K_N)
+    # Pairs nearer than a skin are listed until the bodies have moved by as much.
+    near, skin, path = pairs, 0.02 * size, np.inf
+    touch, rest, rest_pose = 0.0, 0.0, 0j
+    for _ in range(int(100.0 * rest_time / h)):
         place += h * velocity
         angle += h * spin
-        time, path = time + h, path + h * speed
         turn = np.exp(1j * angle)
-        if len(pairs) == 0 or path > skin:
-            pairs, gap = near_pairs(bodies, place, turn, skin)
-            path = 0.0
-        force, torque, overlap = forces(bodies, place, turn, velocity, spin, pairs, slip, h)
-        for k in range(2):
-            velocity[k] += h * force[k] / bodies[k].mass
-            spin[k] += h * torque[k] / bodies[k].inertia
-        if overlap > 0.5 * (i.radius + j.radius):
-            return "failed", touch  # they overlap too deeply for the contact law
+        cores = (place[0] + turn[0] * i.vertices, place[1] + turn[1] * j.vertices)
+        path += h * (abs(velocity[1] - velocity[0]) + (outer * abs(spin)).sum())
+        if path > skin:
+            near, path = [p for p in pairs if -contact(bodies, cores, p)[0] < skin], 0.0
 
-        # Collision: the outlines touch for the first time.
+        # Newton's and Euler's equations: weight (3), drag (4), and what acts between the two.
+        force, torque, overlap = interaction(bodies, cores, place, velocity, spin, near, slip, h)
+        velocity += h * (-1j * GRAVITY + (np.array([-force, force]) - drag * velocity) / mass)
+        spin += h * (torque - spin_drag * spin) / inertia
+
         apart = place[1] - place[0]
-        distance = abs(apart)
-        if overlap > 0.0 and math.isnan(touch):
-            touch = distance
-        # Departure, or a miss: j is below i, beyond reach at any angle, and gets away.
-        gone = distance > i.outer + j.outer + 2e-6 and apart.imag < 0.0
-        if gone and dot(apart, velocity[1] - velocity[0]) > 0.0:
-            return ("missed" if math.isnan(touch) else "departed"), touch
-        # Aggregation: they rest in contact like one rigid body, the faster one hanging below the
-        # slower one, so that its weight pulls at the contact as strongly as it ever will.
-        pose, bend = apart / turn[0], angle[1] - angle[0]
-        if abs(pose - rest_pose) + abs(bend - rest_angle) * least_outer > 1e-3 * size:
-            rest_pose, rest_angle, rest_since = pose, bend, time
-        hangs = -apart.imag > 0.99 * distance
-        if overlap > 0.0 and hangs and time - rest_since > rest_time:
-            return "aggregated", touch
+        if overlap > 0.5 * (i.radius + j.radius):
+            return "failed", touch  # too deep for the contact law
+        if touch == 0.0 and overlap > 0.0:
+            touch = abs(apart)
+        # Departure: below the slower body, out of its reach at any angle, and moving away.
+        parts = ((velocity[1] - velocity[0]) / apart).real > 0.0
+        if parts and apart.imag < 0.0 and abs(apart) > outer.sum() + 2e-6:
+            return ("missed" if touch == 0.0 else "B" if touch < zone else "D"), touch
+        # Aggregation: in contact and at rest like one rigid body. A doublet turns until the faster
+        # body hangs below, where its weight pulls as hard as it ever will: the contact must bear
+        # that. The pose of j, seen from i, is where a point of its rim is.
+        pose, rest = (apart + j.outer * turn[1]) / turn[0], rest + h
+        if abs(pose - rest_pose) > 1e-3 * size:
+            rest_pose, rest = pose, 0.0
+        if overlap > 0.0 and rest > rest_time and -apart.imag > 0.99 * abs(apart):
+            return ("A" if touch < zone else "C"), touch
     return "undecided", touch
 
 
-def outcome(i, j, place, angle, **options):
-    """Return the class A to D (or missed, undecided, failed) and d_c at the touch [m].
+# --- A small study ----------------------------------------------------------------------------
 
-    Both start at their settling velocities, without spin.
-    """
-    velocity = np.array([-1j * settling_speed(i), -1j * settling_speed(j)])
-    place, angle = np.array(place, complex), np.array(angle, float)
-    fate, touch = encounter((i, j), place, angle, velocity, np.zeros(2), **options)
-    if fate not in ("aggregated", "departed"):
-        return fate, touch
-    inside = touch < zone_distance(i, j)
-    return {"aggregated": "AC", "departed": "BD"}[fate][0 if inside else 1], touch
+TYPES = {"I": (16.41e-6, 23.02e-6), "II": (4.95e-6, 23.02e-6), "III": (4.62e-6, 4.95e-6)}
+
+
+def random_floc(rng, corners, r_eq):
+    """Return a ragged Body of this equivalent radius."""
+    core = rng.uniform(0.5, 1.5, corners) * np.exp(2j * pi * np.arange(corners) / corners)
+    scale = r_eq / make_body(core, 0.1).r_eq
+    return make_body(scale * core, scale * 0.1)
+
+
+def main(pairs=10, corners=16, share=0.4):
+    """Run pairs of random shapes and orientations of each type of the paper, and count."""
+    print(f"{corners} corners, δ/δ_max = {share}; Pr[A]: of those that touch, how many stay")
+    for name, radii in TYPES.items():
+        rng, classes = np.random.default_rng(1), []
+        for _ in range(pairs):
+            i, j = [random_floc(rng, corners, r_eq) for r_eq in radii]
+            # j starts above, aside by a share of δ_max = R_i + R_j, at any orientations.
+            place = np.array([0j, (share + 1.1j) * (i.outer + j.outer)])
+            classes.append(encounter(i, j, place, 2.0 * pi * rng.random(2))[0])
+        stay, depart = (sum(map(classes.count, letters)) for letters in ("AC", "BD"))
+        print(f"type {name:3}: {' '.join(classes)}   Pr[A] = {stay}/{stay + depart}")
+
+
+if __name__ == "__main__":
+    main()
