@@ -15,9 +15,9 @@ decide whether they lock or roll off each other. The collision is of class
     C  if they touch outside the attraction zone and stay together,   D  outside, and depart.
 
 Units are SI, gravity points to −y, angles are counter-clockwise [rad]. Points and vectors of the
-plane are complex numbers x + iy. A turn by θ is a product with exp(iθ), and a* b, a* the complex
-conjugate, is the scalar product of two vectors plus i times their vector product. Likewise b/n has
-the parts of b along a unit vector n (real) and across it, to its left (imaginary).
+plane are complex numbers x + iy: a product with exp(iθ) turns them by θ. With a* the conjugate of
+a, the real part of a*b is the scalar product of a and b, the imaginary part their vector product.
+The real part of b/n is the component of b along a unit vector n, the imaginary part that across.
 """
 
 from math import exp, hypot, pi, sqrt
@@ -32,12 +32,12 @@ from scipy.special import lambertw
 # Table 1 and section 2.4 of the paper, with two gaps closed so that its findings appear. It prints
 # a Debye length 1/κ of 0.98 nm, at which attraction wins everywhere and nothing bounds a zone;
 # 0.98 µm is that of the distilled water used. It prints no mass per area; the damping in Table 1
-# implies about 2 kg/m² (a hundred times that of real flocs).
+# implies about 2 kg/m², a hundred times as heavy as solid spheres of these sizes.
 GRAVITY = 9.81  # g [m/s²]
 VISCOSITY = 8.9e-4  # γ [Pa s]
 SURFACE_DENSITY = 2.0  # ρ_s [kg/m²]
 HAMAKER = 1.0e-18  # H_A [J]
-LEAST_GAP = 1.0e-9  # d below which attraction no longer grows, as (5) diverges at contact [m]
+LEAST_GAP = 1.0e-9  # d below which (5) is held constant, as it diverges at contact [m]
 POTENTIAL = 15e-3  # φ [V]
 PERMITTIVITY = 78.5 * 8.854e-12  # ε_r ε_0 [F/m]
 KAPPA = 1.0 / 0.98e-6  # κ [1/m]
@@ -52,16 +52,16 @@ BALANCE_GAP = -2.0 * lambertw(-sqrt(S) / 2.0, -1).real / KAPPA  # d_0 [m]
 
 
 class Body(NamedTuple):
-    """A spheropolygon (1): all that a disk covers whose centre is anywhere in a polygon, its core.
+    """A spheropolygon (1): what a disk covers as its centre moves all over a polygon, the core.
 
-    One vertex makes a sphere. The core may have bays, but must not cross itself.
+    One vertex makes a sphere. The core may have bays but must not cross itself.
     """
 
     vertices: np.ndarray  # corners of the core, in order, from the centroid of the body [m]
-    radius: float  # of the disk, the spheroradius [m]
+    radius: float  # spheroradius, that of the disk [m]
     mass: float  # m = ρ_s A [kg]
     inertia: float  # ρ_s J, J the second moment of area [kg m²]
-    r_eq: float  # equivalent radius, that of a disk with the same area [m]
+    r_eq: float  # equivalent radius, √(A/π) [m]
     outer: float  # R, the largest distance from the centroid to the outline [m]
 
 
@@ -85,13 +85,13 @@ def core_distance(point, vertices):
 
 
 def make_body(vertices, radius, cells=400):
-    """Return the Body of a core and a radius; its moments are sums over the cells of a grid."""
+    """Return the Body with this core and spheroradius; area and moments are sums over a grid."""
     vertices = np.array(vertices, complex)
     reach = abs(vertices).max() + 1.1 * radius
     x, size = np.linspace(-reach, reach, cells, retstep=True)
     points = (x + 1j * x[:, None]).ravel()
     distance = np.array([core_distance(point, vertices) for point in points])
-    # The outline, where the core is a radius away, covers part of the cells that it passes through.
+    # Cells that the outline passes through, where the core is a radius away, are covered in part.
     covered = np.clip(0.5 + (radius - distance) / size, 0.0, 1.0)
     area = size**2 * covered.sum()
     centroid = np.average(points, weights=covered)
@@ -106,10 +106,10 @@ def make_body(vertices, radius, cells=400):
 
 @njit
 def contact(bodies, cores, pair):
-    """Return overlap Δ, normal from i to j, and the middle of the overlap, of a vertex and an edge.
+    """Return the overlap Δ of a vertex and an edge, its normal from i to j, and its middle.
 
-    ``cores``: vertices of both bodies where they are now; ``pair``: (body of the vertex, its
-    number, number of the edge of the other body).
+    ``cores``: the vertices of both bodies where they are now. ``pair``: (body of the vertex, its
+    index, index of the edge of the other body).
     """
     one, vertex, edge = pair
     point, core = cores[one][vertex], cores[1 - one]
@@ -122,15 +122,15 @@ def contact(bodies, cores, pair):
 
 @njit
 def interaction(bodies, cores, place, velocity, spin, pairs, slip, h):
-    """Return the force on j (that on i is the opposite), both torques, and the deepest overlap.
+    """Return the force on j (on i its opposite acts), both torques, and the largest overlap.
 
-    ``pairs``: all pairs of a vertex and an edge that may touch; ``slip``: their tangential elastic
-    displacements ξ [m], by pair, which are advanced by a step h.
+    ``pairs``: the pairs of a vertex and an edge that may touch. ``slip``: the tangential elastic
+    displacement ξ of every pair [m], which this function advances by a step h.
     """
     i, j = bodies
     # Van der Waals attraction (5) and double-layer repulsion (6) along the line of centres. Their d
-    # is the gap of the equivalent spheres; r* = r_i r_j/(r_i + r_j). Where outlines interlock these
-    # spheres overlap: then d < 0, and both forces keep their values at contact.
+    # is the gap of the equivalent spheres; r* = r_i r_j/(r_i + r_j). These spheres overlap where
+    # outlines interlock: then d < 0, and both forces keep their values at contact.
     apart, r_star = place[1] - place[0], i.r_eq * j.r_eq / (i.r_eq + j.r_eq)
     d = abs(apart) - i.r_eq - j.r_eq
     attraction = HAMAKER * r_star / (6.0 * max(d, LEAST_GAP) ** 2)
@@ -144,22 +144,22 @@ def interaction(bodies, cores, place, velocity, spin, pairs, slip, h):
         overlap, normal, middle = contact(bodies, cores, pair)
         deepest = max(deepest, overlap)
         if overlap > 0.0:
-            # The velocity of j against i at the contact: v_n and v_t are its parts.
+            # Velocity of j relative to i at the contact, as v_n + i v_t.
             arms = middle - place
             velocities = velocity + 1j * spin * arms
             v = (velocities[1] - velocities[0]) / normal
             # No sliding: ξ is the integral of v_t for as long as the contact lasts.
             slip[pair] += h * v.imag
-            # Elastic (7) and viscous (8) forces. They may pull: critical damping needs that.
+            # Elastic (7) and viscous (8) forces. In separation their sum may pull, as in the paper.
             push = K_N * overlap - damping * v.real
             shear = -K_T * slip[pair] - damping * K_T / K_N * v.imag
             on_j = (push + 1j * shear) * normal
             force += on_j
             torque += np.array([-1.0, 1.0]) * (np.conj(arms) * on_j).imag
         elif slip[pair] != 0.0:
-            # The pair has opened. As bodies roll, pair after pair carries the same contact,
-            # whose tangential force must not jump: the nearest closed pair within r_i + r_j takes
-            # over ξ, as far as elastic energy does not grow. Without an heir ξ is lost.
+            # The pair has opened. As bodies roll, a contact passes from pair to pair, and its
+            # tangential force must not jump: the nearest closed pair within r_i + r_j takes over
+            # ξ, as far as the elastic energy does not grow. Without an heir ξ is lost.
             heir, nearest = pair, i.radius + j.radius
             for other in pairs:
                 closed, _, there = contact(bodies, cores, other)
@@ -178,23 +178,23 @@ def interaction(bodies, cores, place, velocity, spin, pairs, slip, h):
 def encounter(i, j, place, angle, fineness=0.05):
     """Return the class A to D, or missed, undecided or failed, and d_c at the first touch [m].
 
-    From ``place`` and ``angle`` both start at settling velocity, without spin. Steps are leapfrog
-    (velocity Verlet with velocities half a step behind), in contact of ``fineness``/ω_0,
-    ω_0 = √(k_n/M): well below 1.
+    Both start at their settling velocities, without spin. The integrator is leapfrog: velocity
+    Verlet, with velocities half a step behind. Its step is ``fineness``/ω_0, ω_0 = √(k_n/M); it
+    has to resolve contacts, so that ``fineness`` must be well below 1.
     """
     bodies, place, angle = (i, j), place.copy(), angle.copy()
     mass, inertia = np.array([i.mass, j.mass]), np.array([i.inertia, j.inertia])
     r_eq, outer = np.array([i.r_eq, j.r_eq]), np.array([i.outer, j.outer])
-    # Stokes drag (4) of the equivalent spheres, and their torque, which the paper does not have.
+    # Stokes drag (4) of the equivalent spheres, and its torque, which the paper leaves out.
     drag, spin_drag = 6.0 * pi * VISCOSITY * r_eq, 8.0 * pi * VISCOSITY * r_eq**3
     velocity, spin = -1j * mass * GRAVITY / drag, np.zeros(2)
-    # A doublet swings round within about size/drift, damped within m/(6πγ r_eq).
+    # A doublet turns within about size/drift, and stops swinging within m/(6πγ r_eq).
     size, relaxation, drift = r_eq.sum(), (mass / drag).max(), abs(velocity[1] - velocity[0])
     rest_time, zone = 3.0 * max(size / drift, relaxation), size + BALANCE_GAP
 
-    # Each vertex of one with each edge of the other, both ways round: the elastic energy then is
-    # smooth wherever a contact rolls (at a corner up to four pairs act at once). A sphere has no
-    # edge: two spheres have one pair, their vertices.
+    # Each vertex of one with each edge of the other, both ways round. So the elastic energy is
+    # smooth wherever a contact rolls; at a corner up to four pairs act at once. A sphere has a
+    # vertex and no edge; the one pair of two spheres are their vertices.
     n, m = (len(i.vertices), len(j.vertices)), (len(j.vertices), len(i.vertices))
     pairs = [(k, v, e) for k in (0, 1) for v in range(n[k]) for e in range(m[k]) if m[k] > 1]
     if len(pairs) == 0:
@@ -209,11 +209,11 @@ def encounter(i, j, place, angle, fineness=0.05):
         angle += h * spin
         turn = np.exp(1j * angle)
         cores = (place[0] + turn[0] * i.vertices, place[1] + turn[1] * j.vertices)
-        path += h * (abs(velocity[1] - velocity[0]) + (outer * abs(spin)).sum())
+        path += h * (abs(velocity[1] - velocity[0]) + (outer * np.abs(spin)).sum())
         if path > skin:
             near, path = [p for p in pairs if -contact(bodies, cores, p)[0] < skin], 0.0
 
-        # Newton's and Euler's equations: weight (3), drag (4), and what acts between the two.
+        # Newton's and Euler's equations: weight (3), drag (4), and the forces between the two.
         force, torque, overlap = interaction(bodies, cores, place, velocity, spin, near, slip, h)
         velocity += h * (-1j * GRAVITY + (np.array([-force, force]) - drag * velocity) / mass)
         spin += h * (torque - spin_drag * spin) / inertia
@@ -223,13 +223,13 @@ def encounter(i, j, place, angle, fineness=0.05):
             return "failed", touch  # too deep for the contact law
         if touch == 0.0 and overlap > 0.0:
             touch = abs(apart)
-        # Departure: below the slower body, out of its reach at any angle, and moving away.
+        # Departure: j is below i and moves away, too far for outlines to meet at any angle.
         parts = ((velocity[1] - velocity[0]) / apart).real > 0.0
         if parts and apart.imag < 0.0 and abs(apart) > outer.sum() + 2e-6:
             return ("missed" if touch == 0.0 else "B" if touch < zone else "D"), touch
-        # Aggregation: in contact and at rest like one rigid body. A doublet turns until the faster
-        # body hangs below, where its weight pulls as hard as it ever will: the contact must bear
-        # that. The pose of j, seen from i, is where a point of its rim is.
+        # Aggregation: both are in contact and have moved like one rigid body for the rest time. j
+        # hangs below i, as every doublet turns that way, and the pull on the contact is largest
+        # there. The pose of j is the position of a point of its rim, seen from i.
         pose, rest = (apart + j.outer * turn[1]) / turn[0], rest + h
         if abs(pose - rest_pose) > 1e-3 * size:
             rest_pose, rest = pose, 0.0
