@@ -80,11 +80,11 @@ def core_distance(point, vertices):
     for k in range(len(vertices)):
         nearest = min(nearest, abs(point - nearest_on_edge(point, vertices[k - 1], vertices[k])))
         # Seen from inside, the outline goes round by 2π in all; from outside, by 0.
-        winding += np.angle((vertices[k] - point) / (vertices[k - 1] - point))
+        winding += np.angle((vertices[k] - point) * (vertices[k - 1] - point).conjugate())
     return 0.0 if abs(winding) > 1.0 else nearest
 
 
-def make_body(vertices, radius, cells=400):
+def make_body(vertices, radius, cells=200):
     """Return the Body with this core and spheroradius; area and moments are sums over a grid."""
     vertices = np.array(vertices, complex)
     reach = abs(vertices).max() + 1.1 * radius
@@ -244,7 +244,7 @@ TYPES = {"I": (16.41e-6, 23.02e-6), "II": (4.95e-6, 23.02e-6), "III": (4.62e-6, 
 
 
 def random_floc(rng, corners, r_eq):
-    """Return a ragged Body of this equivalent radius."""
+    """Return a ragged Body of this equivalent radius; with one corner, a sphere."""
     core = rng.uniform(0.5, 1.5, corners) * np.exp(2j * pi * np.arange(corners) / corners)
     scale = r_eq / make_body(core, 0.1).r_eq
     return make_body(scale * core, scale * 0.1)
