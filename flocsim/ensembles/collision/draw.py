@@ -256,10 +256,10 @@ SHORTER = 0.25
 MORE_STEPS = 5
 """By how much a run may take more steps than the one before."""
 
-THIRD_OF = 16
+THIRD_OF = 8
 """One in so many second runs has a third one behind it."""
 
-FEW, CHECKED_FRACTION = 16, 0.035
+FEW, CHECKED_FRACTION = 24, 0.035
 """How many replicates of a condition "auto" has run again at least, and the fraction of them where
 that is more: less than a fifth of the cost of a study of 1,000
 (benchmarks.accuracy.numerical_error)."""

@@ -210,10 +210,10 @@ def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray
     return found
 
 
-LATE_RATES = np.array([0.5, 0.5]), np.array([1e-3, 0.5]), np.log([0.9, 0.1])
+LATE_RATES = np.array([1.5, 0.5]), np.array([0.003, 0.5]), np.log([0.9, 0.1])
 """Shapes and means of two gamma distributions of the rate at which third runs flip, and the
-logarithms of their weights: one in a thousand, more in some studies and fewer in others, as third
-runs were seen to flip (benchmarks.accuracy.numerical_error); and Jeffreys's prior behind a single
+logarithms of their weights: Jeffreys's shape of ½ after one flip in 500 runs, more than third runs
+were seen to flip at any tolerance (benchmarks.accuracy.numerical_error); and after none in a single
 run, in case that this study is not like those. Source of such mixtures: Schmidli et al., Biometrics
 70 (2014) 1023, section 3. The few third runs of a small study would say next to nothing by
 themselves."""

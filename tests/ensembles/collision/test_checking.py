@@ -42,11 +42,11 @@ def test_of_the_first_so_many_just_as_many_are_checked_as_are_said_to_be(seed, s
     assert third == math.ceil(chosen[-1] / THIRD_OF) and (share == 0.0 or max(runs[:40]) == 2)
 
 
-def test_auto_checks_the_first_sixteen_and_later_a_fixed_fraction():
-    wanted = {n: expected_checks(n, "auto") for n in (1, 3, 16, 60, 1000, 10**6)}
-    assert wanted == {1: 1, 3: 3, 16: 16, 60: 16, 1000: 35, 10**6: 35_000}
-    easily = {n: expected_checks(n, "auto", easily=True) for n in (10, 48, 60, 1000)}
-    assert easily == {10: 10, 48: 48, 60: 48, 1000: 105}
+def test_auto_checks_the_first_replicates_and_later_a_fixed_fraction():
+    wanted = {n: expected_checks(n, "auto") for n in (1, 3, 24, 60, 1000, 10**6)}
+    assert wanted == {1: 1, 3: 3, 24: 24, 60: 24, 1000: 35, 10**6: 35_000}
+    easily = {n: expected_checks(n, "auto", easily=True) for n in (10, 72, 90, 1000)}
+    assert easily == {10: 10, 72: 72, 90: 72, 1000: 105}
     assert max(np.diff([expected_checks(n, "auto", easily=True) for n in range(3000)])) <= 1.0
 
 
