@@ -169,7 +169,7 @@ def weight_of(bodies: BodiesConfig, fluid: Fluid, results: Results) -> str:
     sunk = "" if fluid.buoyancy else ", no buoyancy"
     if isinstance(bodies.density, FractalDensity):
         return f"real weight{sunk}"
-    if bodies.density is not None:
+    if bodies.surface_density is None:
         return f"{bodies.density:g} kg/m³{sunk}"
     words = f"{bodies.surface_density:g} kg/m² of projected area"
     radii = np.concatenate([np.ravel(each) for each in results.radii.values()])
