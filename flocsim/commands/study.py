@@ -9,7 +9,6 @@ import contextlib
 import json
 import os
 import shlex
-import signal
 import subprocess
 import sys
 from argparse import ArgumentParser, Namespace
@@ -169,7 +168,8 @@ def make_study(args: Namespace) -> int:
     codes: list[int] = []
     said: list[str] = []
     with open_folder(Path(args.output)) as folder:
-        print(f"takes about {lasts}, and a minute or two more the first time; Ctrl-C loses nothing")
+        if not (folder.path / "shapes.h5").exists():
+            print(f"takes about {lasts}, and a minute or two more the first time that flocsim runs")
         fit_shapes(args, pictures, folder)
         for preset in presets:
             report = f"report-{preset}.html" if said else "report.html"
@@ -192,11 +192,12 @@ def call(*words: str) -> int:
     KeyboardInterrupt where it was stopped; where it failed, which it has said, SystemExit.
     """
     print(f"\n$ {shlex.join(['flocsim', *words])}", flush=True)
-    process = subprocess.Popen([*program(), *words])
+    # In a process group of its own, since Ctrl-C in the midst of imports shows where it came.
+    process = subprocess.Popen([*program(), *words], process_group=0)
     try:
         code = process.wait()
     except KeyboardInterrupt:
-        process.send_signal(signal.SIGINT)  # where the signal was meant for this process alone
+        process.terminate()
         process.wait()
         raise
     if code in (STOPPED, INTERRUPTED) or code < 0:
