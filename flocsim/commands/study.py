@@ -176,8 +176,8 @@ def make_study(args: Namespace) -> int:
             codes.append(run_preset(args, preset, report, folder))
             kind, file = open_kind(folder.path / f"{preset}.h5")
             found = kind.read(file)
-            said += [kind.setting(found), kind.answer(found), f"{folder.path / report}\n"]
-    print("", *said, sep="\n")
+            said += ["", kind.setting(found), kind.answer(found), str(folder.path / report)]
+    print(*said, sep="\n")
     return max(codes)
 
 

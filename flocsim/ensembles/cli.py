@@ -245,7 +245,7 @@ def program() -> list[str]:
     """Return the words that start flocsim as this process was started."""
     # python -m flocsim, or flocsim.ensemble, or a program that is not ours.
     if sys.modules["__main__"].__spec__ is not None or Path(sys.argv[0]).stem != "flocsim":
-        return [sys.orig_argv[0], "-m", "flocsim"]
+        return [on_path(sys.executable), "-m", "flocsim"]
     return [on_path(sys.argv[0])]
 
 
