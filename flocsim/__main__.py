@@ -19,6 +19,9 @@ from flocsim.ensembles.parallel.processes import launched_rank, launched_size
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.arguments import Parser
 
+STARTERS = ("study", "sweep")
+"""Commands that start processes of their own, which would meet those of a launcher."""
+
 
 def make_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     """Return the parser of a command line ``words``, with the arguments of its command alone, as
@@ -56,8 +59,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                     "has that option",
                     file=sys.stderr,
                 )
-                if arguments.command == "sweep" and not arguments.dry_run:
-                    return UsageError.exit_code  # it starts processes of its own
+                if arguments.command in STARTERS and not getattr(arguments, "dry_run", False):
+                    return UsageError.exit_code
         code = run(arguments)
         problem = output_problem() if code == 0 else ""
         if problem:

@@ -20,6 +20,7 @@ from typing import Any
 from flocsim.io.arguments import document
 
 SUMMARIES = {
+    "study": "pictures of flocs to a report, in one command",
     "init": "write an example config file",
     "fit": "fit spheropolygons to the flocs in pictures",
     "shapes": "list, select and merge the flocs of shape libraries",

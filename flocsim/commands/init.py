@@ -17,6 +17,7 @@ KINDS = {
     "study": "all keys, commented",
     "spheres": "spheres alone",
     "paper": "the conditions of Tang et al. (2014)",
+    "clay": "flocs of clay in the sea, at their measured sizes and real weight",
     "measured": "flocs at their measured sizes",
     "pictures": "flocs fitted to pictures",
     "force": "a force of your own, with its module",

@@ -240,12 +240,17 @@ ANEW = re.compile("--(resu|rest|overw)[a-z]*")
 def continuing(ranks: int = 1) -> str:
     """Return the command line that continues this run, with the launcher where it has ``ranks``."""
     words = [*(word for word in sys.argv[1:] if not ANEW.fullmatch(word)), "--resume"]
-    program = [on_path(sys.argv[0])]
-    if sys.modules["__main__"].__spec__ is not None:  # python -m flocsim, or flocsim.ensemble
-        program = [sys.orig_argv[0], "-m", "flocsim"]
     launcher = Path(sys.executable).with_name("mpirun")
     launch = [on_path(launcher) if launcher.exists() else "mpirun", "-n", str(ranks)]
-    return shlex.join([*(launch if ranks > 1 else []), *program, *words])
+    return shlex.join([*(launch if ranks > 1 else []), *program(), *words])
+
+
+def program() -> list[str]:
+    """Return the words that start flocsim as this process was started."""
+    # python -m flocsim, or flocsim.ensemble, or a program that is not ours.
+    if sys.modules["__main__"].__spec__ is not None or Path(sys.argv[0]).stem != "flocsim":
+        return [on_path(sys.executable), "-m", "flocsim"]
+    return [on_path(sys.argv[0])]
 
 
 def on_path(program: str | os.PathLike) -> str:

@@ -1,0 +1,265 @@
+"""`flocsim study frames/*.png --pixel-size 0.95e-6 -o kaolin/`: from pictures to a report.
+
+Every step is a command that could be typed, and is shown as such. All is kept in one folder. What
+the study has made there is listed in its record, with checksums: it replaces these files as long
+as nobody has changed them, and no others.
+"""
+
+import contextlib
+import json
+import os
+import shlex
+import subprocess
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from flocsim import __version__
+from flocsim.commands import add_overwrite, add_settings
+from flocsim.commands.fit import length
+from flocsim.commands.fit_pictures import list_pictures
+from flocsim.commands.sweep import interrupt
+from flocsim.ensembles.cli import program
+from flocsim.ensembles.contents import open_kind
+from flocsim.errors import FileError, UsageError
+from flocsim.io.arguments import whole
+from flocsim.io.files import make_folder, write_file
+from flocsim.io.journal import Lock
+from flocsim.io.json_text import read_json
+from flocsim.io.seals import digest_of, held
+from flocsim.io.terminal import duration
+from flocsim.process import INTERRUPTED, STOPPED, WITHHELD, handle
+
+KINDS = {"clay": "clay", "tang2014": "paper", "si": "measured"}
+"""Presets, and the kind of `flocsim init` with each."""
+
+FIGURES = ("overview", "outcomes")
+"""Figures that are drawn as files; the report has them all."""
+
+RECORD = "study.json"
+FORM: dict[str, Any] = {"source": {}, "made": {}, "shown": {}}
+"""The record of a folder, as a pattern of `flocsim.io.json_text`: of what the shapes were made;
+{file: checksum} of what the study has made, "" while it makes it; {report: what it shows}."""
+
+SECONDS = {"picture": 3.0, "replicate": 0.1, "study": 15.0}
+"""CPU time of a picture, of a replicate of all conditions, and of all else in a study."""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Find the flocs in pictures, let pairs of them settle onto each other, and write a report of
+    what becomes of them: at their real weight in sea water and, beside it, under the conditions of
+    Tang et al. (2014). Each step is shown as the command that does it.
+
+      flocsim study frames/*.png --pixel-size 0.95e-6 -o kaolin/
+
+    Given once more, the command goes on where it was stopped, or with more replicates. A config
+    in the folder may be edited: it is used as it is.
+
+    images IMAGE: picture, or folder of pictures
+    --pixel-size LENGTH: length of a pixel's side, e.g. '0.95 um', or in metres: 0.95e-6 (default:
+        as given in an OME-TIFF or ImageJ file)
+    --output FOLDER: folder to make, and to go on in (default: %(default)s)
+    --replicates K: pairs in each condition (default: as the configs say, 100)
+    --preset: preset to run; may be repeated (default: clay and tang2014)
+    --fit OPTIONS: further options of flocsim fit, as --fit='--flocs bright --drop 023.png#3'
+    --jobs K: number of processes (default: one for each core, here %(default)s)
+    --overwrite: make anew what other pictures, or another config, have given; each old file is
+        kept, clay.h5 as clay.1.h5
+    """
+    affinity = getattr(os, "sched_getaffinity", None)  # not on all systems
+    add = parser.add_argument
+    add("images", nargs="+")
+    add("--pixel-size", type=length)
+    add("-o", "--output", default="study")
+    add("--replicates", type=whole)
+    add("--preset", action="append", choices=KINDS)
+    add("--fit", type=shlex.split, default=[])
+    add("--jobs", type=whole, default=len(affinity(0)) if affinity else os.cpu_count() or 1)
+    add_settings(parser)
+    add_overwrite(parser)
+
+
+@attrs.define
+class StudyFolder:
+    """A folder that `flocsim study` made, with its record; `open_folder` gives it, locked."""
+
+    path: Path
+    record: dict[str, Any]
+
+    def save(self) -> None:
+        """Write the record over the old one."""
+        path = self.path / RECORD
+        write_file(path, json.dumps(self.record, indent=1).encode(), held(path))
+
+    def is_own(self, name: str) -> bool:
+        """Return True if a file is there as the study has made it, or was making it."""
+        path = self.path / name
+        return path.exists() and self.record["made"].get(name) in ("", checksum(path))
+
+    def make(self, names: Sequence[str], *words: str) -> None:
+        """Run a command that writes these files, in the place of those that are its own."""
+        made = self.record["made"]
+        for name in names:
+            if self.is_own(name):
+                (self.path / name).unlink()
+            if not (self.path / name).exists():
+                made[name] = ""
+        self.save()
+        call(*words)
+        made |= {name: checksum(self.path / name) for name in names}
+        self.save()
+
+
+def checksum(path: Path) -> str:
+    """Return the checksum of a file as text."""
+    return digest_of(path.read_bytes(), 16).hex()
+
+
+@contextlib.contextmanager
+def open_folder(path: Path) -> Iterator[StudyFolder]:
+    """Make the folder of a study, or open the one that is there, for this process alone.
+
+    UsageError for a folder that has files and was not made by `flocsim study`; FileError where
+    another study runs in it, or nothing can be written.
+    """
+    record = path / RECORD
+    if path.is_dir() and not record.exists() and any(path.iterdir()):
+        raise UsageError(f"{path} has files and was not made by flocsim study: name another by -o")
+    make_folder(path, "--output ")
+    lock = Lock(path / f"{RECORD}.lock")
+    try:
+        known = read_json(record.read_bytes(), FORM) if record.exists() else {}
+        folder = StudyFolder(path, {name: known.get(name, {}) for name in FORM})
+        folder.save()
+        yield folder
+    except ValueError as error:
+        raise FileError(f"{record} is no record of a study: {error}") from error
+    finally:
+        lock.remove()
+
+
+def run(args: Namespace) -> int:
+    """Do what is missing of a study and say what it found; return the exit code."""
+    handle(interrupt)
+    try:
+        return make_study(args)
+    except KeyboardInterrupt as error:
+        again = shlex.join([*program(), *sys.argv[1:]])
+        who = str(error) or "stopped by SIGINT"
+        print(f"flocsim: {who}: what was finished is kept, go on with\n{again}", file=sys.stderr)
+        return STOPPED
+    except OSError as error:
+        raise error if isinstance(error, FileError) else FileError(str(error)) from error
+
+
+def make_study(args: Namespace) -> int:
+    """Take all steps that are missing; return the exit code."""
+    pictures = list_pictures(args.images, "--masks" in args.fit)
+    if missing := [path for path in pictures if not path.is_file()]:
+        raise UsageError(f"{missing[0]} is not a file: name pictures, or a folder of pictures")
+    presets = list(dict.fromkeys(args.preset or ["clay", "tang2014"]))
+    work = SECONDS["picture"] * len(pictures)
+    work += SECONDS["replicate"] * (args.replicates or 100) * len(presets)
+    lasts = duration(work / args.jobs + SECONDS["study"] * len(presets))
+    codes: list[int] = []
+    said: list[str] = []
+    with open_folder(Path(args.output)) as folder:
+        if not (folder.path / "shapes.h5").exists():
+            print(f"takes about {lasts}, and a minute or two more the first time that flocsim runs")
+        fit_shapes(args, pictures, folder)
+        for preset in presets:
+            report = f"report-{preset}.html" if said else "report.html"
+            codes.append(run_preset(args, preset, report, folder))
+            kind, file = open_kind(folder.path / f"{preset}.h5")
+            found = kind.read(file)
+            said += ["", kind.setting(found), kind.answer(found), str(folder.path / report)]
+    print(*said, sep="\n")
+    return max(codes)
+
+
+def typed(path: str | os.PathLike) -> str:
+    """Return a path as an argument that is not taken for an option."""
+    return f"./{path}" if str(path).startswith("-") else str(path)
+
+
+def call(*words: str) -> int:
+    """Show a command of flocsim and run it; return its exit code, 0 or WITHHELD.
+
+    KeyboardInterrupt where it was stopped; where it failed, which it has said, SystemExit.
+    """
+    print(f"\n$ {shlex.join(['flocsim', *words])}", flush=True)
+    # In a process group of its own, since Ctrl-C in the midst of imports shows where it came.
+    process = subprocess.Popen([*program(), *words], process_group=0)
+    try:
+        code = process.wait()
+    except KeyboardInterrupt:
+        process.terminate()
+        process.wait()
+        raise
+    if code in (STOPPED, INTERRUPTED) or code < 0:
+        raise KeyboardInterrupt(f"stopped with flocsim {words[0]}")
+    if code not in (0, WITHHELD):
+        raise SystemExit(code)
+    return code
+
+
+def fit_shapes(args: Namespace, pictures: Sequence[Path], folder: StudyFolder) -> None:
+    """Fit the flocs of the pictures, unless the folder has them; UsageError where it has others."""
+    source = {
+        "pictures": sorted([path.name, checksum(path)] for path in pictures),
+        "pixel_size": args.pixel_size,
+        "options": args.fit,
+    }
+    shapes, before = folder.path / "shapes.h5", folder.record["source"]
+    if shapes.exists() and before == source:
+        print(f"{shapes} has the flocs of these pictures")
+        return
+    if shapes.exists() and before and not args.overwrite:
+        raise UsageError(
+            f"{shapes} was made of other pictures, with another pixel size or other options: name "
+            "another folder by -o, or add --overwrite, which keeps the old file under another name"
+        )
+    # Without a source the shapes of a process that is killed now are not taken for the new ones.
+    folder.record["source"] = {}
+    folder.save()
+    words = ["fit", *map(typed, args.images), *args.fit]
+    words += ["--pixel-size", repr(args.pixel_size)] * (args.pixel_size is not None)
+    words += ["--vertices", "4,16,64", "--radius", "1", "--jobs", str(args.jobs)]
+    words += ["-o", typed(shapes), "--overlay", typed(folder.path / "outlines.png")]
+    call(*words, *["--overwrite"] * shapes.exists())
+    folder.record["source"] = source
+    folder.save()
+
+
+def run_preset(args: Namespace, preset: str, report: str, folder: StudyFolder) -> int:
+    """Do what is missing of the study with a preset: config, results, figures and report; return
+    the exit code of its run."""
+    shapes, config, results, figures, page = (
+        typed(folder.path / name)
+        for name in ("shapes.h5", f"{preset}.toml", f"{preset}.h5", "figures", report)
+    )
+    rule = ["--overwrite"] * args.overwrite
+    if not Path(config).exists():
+        words = ["init", config, "--kind", KINDS[preset], "--shapes", shapes]
+        folder.make([f"{preset}.toml"], *words)
+    elif not folder.is_own(f"{preset}.toml"):
+        print(f"\n{config} has been edited, and is used as it is")
+    words = ["ensemble", config, "-o", results, "--resume", *rule]
+    words += ["--jobs", str(args.jobs)] * (args.jobs > 1)
+    words += ["--replicates", str(args.replicates)] * (args.replicates is not None)
+    code = call(*words, *(word for each in args.settings for word in ("--set", each)))
+    shown = [preset, checksum(Path(results)), __version__]
+    if folder.record["shown"].get(report) == shown and Path(page).exists():
+        print(f"{page} shows these results already")
+        return code
+    drawn = [f"figures/{preset}-{name}.png" for name in FIGURES]
+    words = ["plot", results, "--output-dir", figures, "--figures", ",".join(FIGURES)]
+    folder.make(drawn, *words, *rule)
+    folder.make([report], "report", results, "-o", page, *rule)
+    folder.record["shown"][report] = shown
+    folder.save()
+    return code
