@@ -21,9 +21,9 @@ FURTHER = ("collided", "inside", *OTHER)
 """Counts that have columns of their own only where all are asked for."""
 
 LEGEND = (
-    "Pr: of pairs that touched, with 95 % sampling interval; –: none did. A: stick after contact "
-    "inside",
-    "the zone, B: part; C, D: the same outside. other: did not touch, or came to no outcome.",
+    "A, B: contact inside the zone, then stick, part; C, D: the same outside. Pr[A]: A and C of A to "
+    "D.",
+    "[low, high]: 95 % sampling interval; –: no pair touched; other: no contact, or no outcome.",
 )
 """Lines below a table of probabilities."""
 

@@ -1,9 +1,8 @@
 """Does the numerical error of a study matter beside its sampling interval?"""
 
-from collections.abc import Mapping
-
 import numpy as np
 
+from flocsim.io.confidence import wilson
 from flocsim.io.results.schema import Results
 from flocsim.io.results.sweep_file import SweepResults
 
@@ -14,27 +13,24 @@ LARGEST_RATIO = 0.5
 """Numerical error over the width of the sampling interval up to which it is stated once for the
 study."""
 
-FEWEST_FLIPS = 2
-"""How many replicates of a condition a bound allows to flip where none did: it is never sharper."""
-
 
 def numerics_matter(results: Results | SweepResults) -> bool:
     """Return True if the numerical error exceeds half of the sampling interval in any condition.
 
     That is, if the larger side of the change that exact runs could make of Pr[A] or Pr[inside] is
-    more than LARGEST_RATIO of the width of its 95 % interval, and more than FEWEST_FLIPS of its
-    replicates. Conditions without trials, or without re-runs, do not count. ``results`` must have
-    the group `probabilities`. Of a study of rates, that of the efficiency α.
+    more than LARGEST_RATIO of the width that Wilson's 95 % interval of so many collisions has at
+    most, which is at a probability of ½. (At 0 and 1 it is as narrow as four replicates, which is
+    what the bound of a numerical error comes to where nothing flipped.) Conditions without trials,
+    or without re-runs, do not count. ``results`` must have the group `probabilities`. Of a study of
+    rates, if that of the efficiency α exceeds half of its widest interval.
     """
     kernel = getattr(results, "kernel", None)
     if kernel is not None:
-        return exceeds(kernel.arrays, "alpha")
+        arrays = kernel.arrays
+        width = np.nanmax(arrays["alpha_high"] - arrays["alpha_low"], initial=0.0)
+        return bool(np.any(arrays["alpha_numerical"] > LARGEST_RATIO * width))
     table = {k: each.values for k, each in results.labelled("probabilities").columns.items()}
-    return any(exceeds(table, name, FEWEST_FLIPS / table["n_total"]) for name in JUDGED)
-
-
-def exceeds(arrays: Mapping[str, np.ndarray], name: str, least: np.ndarray | float = 0.0) -> bool:
-    """Return True if the numerical error of an estimate is large somewhere, and above ``least``."""
-    low, high, error = (arrays[name + end] for end in ("_low", "_high", "_numerical"))
+    low, high = wilson(table["n_collided"] // 2, table["n_collided"])
+    errors = [table[f"{name}_numerical"] for name in JUDGED]
     # Comparisons are False where one is NaN.
-    return bool(np.any((error > LARGEST_RATIO * (high - low)) & (error > 1.001 * least)))
+    return any(bool(np.any(error > LARGEST_RATIO * (high - low))) for error in errors)
