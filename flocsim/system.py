@@ -316,12 +316,12 @@ class System:
         check_whole(max_steps, 0, "max_steps")
         if shields_clusters(self.forces):
             raise UsageError(
-                "a System does not know its clusters: run a Swarm, or leave the drag's clusters out"
+                "a System does not find clusters: run a Swarm, or leave clusters out of the drag"
             )
         if start is None:
             self.check_overlaps()
         elif amplification:
-            raise UsageError("amplification is that of a whole run: leave start out")
+            raise UsageError("amplification can only be found for a whole run: leave start out")
         if watch is not None and not callable(watch):
             raise UsageError(f"watch must be a function of a State, found {watch!r}")
         for line in plausibility_warnings([self]):
@@ -333,7 +333,7 @@ class System:
         # The run itself; a force that returned no number is identified afterwards.
         status = watched(run, watch)
         if status in UNABLE and (why := force_to_blame(self, run)):
-            warnings.warn(f"the run has ended at t = {run.time:.6g} s ({status.name}): {why}",
+            warnings.warn(f"the run ended at t = {run.time:.6g} s ({status.name}): {why}",
                           KernelWarning, stacklevel=2)  # fmt: skip
         growth = None
         if amplification:
@@ -354,13 +354,13 @@ class System:
         """
         if not isinstance(start, Trajectory):
             raise UsageError(
-                "start must be a Trajectory, at whose end this run begins, found "
-                f"{type(start).__name__}: run the first one until then, and hand that over"
+                "start must be a Trajectory, from whose end this run continues, found "
+                f"{type(start).__name__}: give the result of an earlier run"
             )
         origin = start.known()
         if run.clock.until <= start.t[-1]:
             raise UsageError(
-                f"until must be a time above {start.t[-1]:g} s, at which start has ended, found "
+                f"until must be a time above {start.t[-1]:g} s, the end of start, found "
                 f"{run.clock.until:g}"
             )
         scene = origin.ended.scene

@@ -94,8 +94,8 @@ class Meeting:
     def __attrs_post_init__(self) -> None:
         if not 0.0 < self.touch < 0.1 * self.reach:
             raise UsageError(
-                "two spheres touch at a gap above 0 m and below a tenth of the sum of their radii, "
-                f"{self.reach:g} m, found {self.touch:g} m"
+                "the gap at which two spheres touch must be above 0 m and below a tenth of the sum "
+                f"of their radii, {self.reach:g} m, found {self.touch:g} m"
             )
 
     @property
@@ -120,8 +120,8 @@ class Meeting:
         if not np.isfinite(force).all():
             where = gaps[np.argmin(np.isfinite(force))]
             raise UsageError(
-                f"the force between two spheres gives no number at a gap of {where:.3g} m: bound "
-                "what it divides by, or takes a root, power or logarithm of"
+                f"the force between two spheres is not finite at a gap of {where:.3g} m: bound "
+                "any divisor, and the argument of any root, power or logarithm"
             )
         # Relative mobility: the force acts on both spheres in opposite directions.
         driven = (motion.along[:, 1] - motion.along[:, 0]) * force / gaps

@@ -41,7 +41,7 @@ def positive_gaps(gap: ArrayLike) -> np.ndarray:
     """Return gaps as an array (k,) [m]; raise UsageError unless all are positive."""
     found = np.atleast_1d(np.asarray(gap, dtype=float))
     if not np.all(found > 0.0):
-        raise UsageError("two spheres in water are known at gaps above 0 m")
+        raise UsageError("the gap of two spheres in water must be above 0 m")
     return found
 
 

@@ -314,7 +314,7 @@ def happel_permeability(grain: float, solid: float) -> float:
     """
     if not 0.0 < grain < math.inf or not 0.0 < solid < 1.0:
         raise UsageError(
-            "permeability is of grains of a radius above 0 m that fill a share between 0 and 1, "
+            "permeability needs a grain radius above 0 m and a solid fraction between 0 and 1, "
             f"found {grain} m and {solid}"
         )
     third = solid ** (1.0 / 3.0)

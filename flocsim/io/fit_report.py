@@ -37,9 +37,9 @@ def picture_line(name: str, found: Segmentation) -> str:
     parts = [plural(len(found.regions), f"{found.flocs} floc")]
     if reasons := found.rejected_by_reason():
         listed = (f"{n} {reason.removeprefix('rejected ')}" for reason, n in reasons.items())
-        parts.append(f"rejected {' and '.join(listed)}")
+        parts.append(f"rejected: {', '.join(listed)}")
     if found.left_whole:
-        parts.append(f"{found.left_whole} with necks not separated (--neck)")
+        parts.append(f"{found.left_whole} not separated at their necks (--neck)")
     sure = [each.parted for each in found.regions if each.parted == each.parted]
     if sure:
         low, high = (f"{value:.2f}" for value in (min(sure), max(sure)))
@@ -51,7 +51,7 @@ def picture_line(name: str, found: Segmentation) -> str:
     if found.threshold == found.threshold:
         about += f", threshold {found.threshold:.4g}"
     alarms = "".join(f"; CHECK THE OVERLAY: {alarm}" for alarm in found.alarms)
-    return f"{name}: {', '.join(parts)}; {about}{alarms}"
+    return f"{name}: {'; '.join(parts)}; {about}{alarms}"
 
 
 def coarse_lines(entries: Sequence[ShapeEntry]) -> list[str]:
@@ -60,8 +60,8 @@ def coarse_lines(entries: Sequence[ShapeEntry]) -> list[str]:
     lines = []
     if wide := sum(each.spheroradius >= each.equivalent_radius for each in entries):
         lines.append(
-            f"the spheroradius is not below r_eq of {wide} of {plural(len(entries), 'floc')}, "
-            "whose outline the fit cannot follow: use a smaller --radius"
+            f"the spheroradius is too large to fit {wide} of {plural(len(entries), 'floc')}, whose "
+            "r_eq is not larger: use a smaller --radius"
         )
     # What a disk cannot follow, more vertices do not mend.
     flocs = [e for e in one_each(entries) if e.spheroradius < e.equivalent_radius]
@@ -71,8 +71,7 @@ def coarse_lines(entries: Sequence[ShapeEntry]) -> list[str]:
         worst = max(coarse, key=errors.__getitem__)
         lines.append(
             f"N = {most} is too small for {len(coarse)} of {plural(len(errors), 'floc')}: RE is "
-            f"above {MOST_ERROR:g} %, and {errors[worst]:.3g} % for {worst}; raise the number of "
-            "vertices"
+            f"above {MOST_ERROR:g} %, for {worst} even {errors[worst]:.3g} %; use more vertices"
         )
     return [f"warning: {line}" for line in lines]
 
@@ -87,7 +86,9 @@ def format_errors(entries: Sequence[ShapeEntry]) -> str:
             for count in members[0].fits
         ]
         flocs = plural(len(members), "floc")
-        lines.append(f"mean relative error [%], {flocs}, r = {radius:g} px: {', '.join(means)}")
+        lines.append(
+            f"mean relative error of area [%], {flocs}, r = {radius:g} px: {', '.join(means)}"
+        )
     return "\n".join(lines)
 
 

@@ -57,11 +57,11 @@ LEAST = 5e-324
 OF_FLOC = {
     "id": ("text", "", "picture and region"),
     "image": ("text", "", "file name of the picture"),
-    "pixel_size": ("f8", "m", "length of a pixel's side"),
+    "pixel_size": ("f8", "m", "side of a pixel"),
     "centroid": ("f8", "px", "centroid in the picture, x right and y down"),
-    "area": ("i8", "px", "pixels of the mask"),
+    "area": ("i8", "px", "number of pixels of the mask"),
     "equivalent_radius": ("f8", "px", "radius of the circle of equal area"),
-    "spheroradius": ("f8", "px", "spheroradius asked for"),
+    "spheroradius": ("f8", "px", "requested spheroradius"),
 }
 FLOC_COLUMNS = declared(OF_FLOC, ("floc",), low=LEAST, high=MOST_PIXELS)
 FLOC_COLUMNS["centroid"] = attrs.evolve(
@@ -70,19 +70,19 @@ FLOC_COLUMNS["centroid"] = attrs.evolve(
 
 OF_MASK = {
     "perimeter": ("f8", "px", "length of the outline"),
-    "aspect_ratio": ("f8", "1", "long over short axis of the ellipse of equal moments"),
+    "aspect_ratio": ("f8", "1", "long over short axis of the ellipse with equal moments"),
     "circularity": ("f8", "1", "4 pi area / perimeter^2"),
     "solidity": ("f8", "1", "area over that of the convex hull"),
-    "feret_max": ("f8", "px", "largest distance of two parallel tangents"),
-    "feret_min": ("f8", "px", "smallest distance of two parallel tangents"),
+    "feret_max": ("f8", "px", "largest distance between two parallel tangents"),
+    "feret_min": ("f8", "px", "smallest distance between two parallel tangents"),
 }
 MEASURE_COLUMNS = declared(OF_MASK, ("floc",))
 """The measures of the masks."""
 
 OF_POPULATION = {
-    "weight": ("f8", "1", "number of flocs that it represents, of which filters kept only it"),
-    "radius_low": ("f8", "px", "equivalent radius as it would have been cut closer"),
-    "radius_high": ("f8", "px", "equivalent radius as it would have been cut wider"),
+    "weight": ("f8", "1", "number of flocs that this one represents after filtering"),
+    "radius_low": ("f8", "px", "equivalent radius of the outline cut closer"),
+    "radius_high": ("f8", "px", "equivalent radius of the outline cut wider"),
 }
 POPULATION_COLUMNS = declared(OF_POPULATION, ("floc",), low=LEAST, high=MOST_PIXELS)
 """What the picture leaves open."""
@@ -94,7 +94,7 @@ NUMBERS = {
 }
 RADII = {"point_radius": ("f8", "m", "spheroradius of the part")}
 ERRORS = {
-    "relative_error": ("f8", "percent", "pixels that differ, in percent of the mask's pixels")
+    "relative_error": ("f8", "percent", "differing pixels, in percent of the pixels of the mask")
 }
 """Columns of fits, of each vertex and of the whole."""
 

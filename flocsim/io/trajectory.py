@@ -33,8 +33,8 @@ COMPONENTS = ("x", "y", "angle")
 SCALES = {
     "time": ("f8", "s", "time since the start"),
     "body": ("i8", "1", "number of the body"),
-    "component": ("text", "1", "of a place, and of its rate"),
-    "axis": ("text", "1", "of a point"),
+    "component": ("text", "1", "component of the position or velocity"),
+    "axis": ("text", "1", "coordinate of a point"),
 }
 DATASETS = {
     "position": ("f8", "m, m, rad", "x, y and angle of each body (time, body, 3)"),

@@ -124,9 +124,9 @@ def place_at_random(
         else:
             total = sum(shape.area for shape in shapes) / whole
             raise UsageError(
-                f"{count} of {len(shapes)} bodies, {filled / whole:.3f} of the area, were placed "
-                f"at random, and {MOST_TRIALS} trials found no room for the next: together they "
-                f"would fill {total:.3f}; ask for a smaller fraction"
+                f"{count} of {len(shapes)} bodies were placed at random, on {filled / whole:.3f} "
+                f"of the area, and {MOST_TRIALS} trials found no room for the next one; all would "
+                f"fill {total:.3f}: ask for a smaller fraction"
             )
         placement.add(body, place)
         filled += shapes[body].area

@@ -158,14 +158,14 @@ class Swarm:
                 size = np.mean([body.shape.equivalent_radius for body in self.bodies])
                 raise UsageError(
                     f"{name} has no finite reach, so each of {len(self.bodies)} bodies would act "
-                    f"on all others: give it one (its property `reach`, of some {size:.1g} m), or "
-                    "set all_pairs=True"
+                    f"on all others: give it a property `reach`, for example {size:.1g} m, or set "
+                    "all_pairs=True"
                 )
         self.check_box()
         if kick_parameters(self.forces, self.bodies, self.fluid)[HALVINGS] > 0.0:
             raise UsageError(
-                "a swarm needs kicks of the same length in all of its islands: give the "
-                'thermal force a kick, as "1 ms", and leave finest out'
+                "all islands of a swarm need kicks of the same duration: give Thermal a kick, such "
+                'as "1 ms", and leave finest out'
             )
 
     def __reduce__(self) -> tuple:
@@ -276,10 +276,10 @@ class Swarm:
 
 
 FLOW_ADVICE = (
-    "the flow varies along {axis}, along which the box is periodic: images of a body would be "
-    "carried at a different speed. Make the box periodic along the other axis only, as in a shear "
+    "the flow varies along {axis}, but the box is periodic along {axis}: images of a body would "
+    "move at a different speed. Make the box periodic along the other axis only, as in a shear "
     'flow u_x = g y with periodic = "x", or not at all, periodic = "none" (leaving = "reenter" '
-    "brings back what the flow carries out)"
+    "returns bodies that the flow carries out)"
 )
 
 
@@ -291,8 +291,8 @@ def check_box(shapes: Sequence[Shape], box: tuple[float, float], reach: float) -
     least = LEAST_BOX * (2.0 * largest + reach)
     if side < least:
         raise UsageError(
-            f"the box is {side:.3g} m wide, and forces reach {reach:.3g} m between bodies of up to "
-            f"{2.0 * largest:.3g} m: it must be at least {least:.3g} m, or the forces must be cut "
+            f"the box is {side:.3g} m wide, but forces reach {reach:.3g} m between bodies of up to "
+            f"{2.0 * largest:.3g} m: make the box at least {least:.3g} m wide, or cut the forces "
             "at a smaller gap"
         )
 
@@ -300,7 +300,7 @@ def check_box(shapes: Sequence[Shape], box: tuple[float, float], reach: float) -
 def stops_of(end: float, every: float | str | None, times: Sequence[float] | None) -> list[float]:
     """The times that a run is to keep [s], ``end`` the last; UsageError for what are none."""
     if times is not None and every is not None:
-        raise UsageError("give the times to keep with times or with every, not both")
+        raise UsageError("give only one of times and every, found both")
     if times is not None:
         listed = [float(in_unit(each, "s", "times")) for each in times]
         if sorted(set(listed)) != listed or not all(0.0 < each <= end for each in listed):

@@ -109,7 +109,7 @@ def test_the_extremes_of_sizes_and_vertices(folder):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--set", "forces.contact=false"], "bodies that meet need a contact force"),
+        (["--set", "forces.contact=false"], "colliding bodies need a contact force"),
         (["--set", "bodies.surface_density=20"], "I: an impact at"),
     ],
 )

@@ -109,7 +109,7 @@ MORE = [
     ('[integrator]\nname = "implicite"', "found 'implicite' (did you mean 'implicit'?)"),
     ('[integrator]\nname = "velocity_verlet"', "needs step, the fixed step"),
     ("[forces]\ndrag = false", "no terminal velocity"),
-    ("[forces]\ncontact = false", "bodies that meet need a contact force"),
+    ("[forces]\ncontact = false", "colliding bodies need a contact force"),
     ("[forces]\ngravity = false", "settle at the same speed"),
 ]
 

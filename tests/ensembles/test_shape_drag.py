@@ -33,7 +33,7 @@ def written(folder, scene="", more=""):
 
 
 def test_settling_pairs_are_refused(tmp_path):
-    with pytest.raises(UsageError, match="they fall aslant and turn as they fall"):
+    with pytest.raises(UsageError, match="drift sideways and rotate as they fall"):
         check_study(written(tmp_path))
 
 

@@ -47,7 +47,7 @@ def test_a_study_is_another_than_one_of_independent_replicates_and_can_be_extend
     [
         ({"replicates": 100}, "must be 16 scrambles times a power of 2"),
         ({"replicates": 8}, "give 16 or 32"),
-        ({"stop": {"half_width": 0.1}}, "not for Sobol's points"),
+        ({"stop": {"half_width": 0.1}}, "not for Sobol points"),
         ({"sampling": "halton"}, "sampling must be .random. or .sobol., found .halton."),
     ],
 )

@@ -155,5 +155,5 @@ def test_what_are_no_two_spheres_in_water(given):
 
 @pytest.mark.parametrize("gap", [0.0, -1e-9, float("nan"), [1.0, 0.0]])
 def test_spheres_that_touch_are_refused(gap):
-    with pytest.raises(UsageError, match="gaps above 0 m"):
+    with pytest.raises(UsageError, match="must be above 0 m"):
         EQUAL.along(gap)

@@ -35,4 +35,4 @@ def test_an_n_too_small_is_reported_with_the_worst_floc(errors, said):
 
 def test_a_disk_as_large_as_a_floc_is_reported_and_its_error_is_not():
     [line] = coarse_lines([entry("a", {16: 50.0}, 5.0), entry("b", {16: 1.0}, 5.0)])
-    assert line.startswith("warning: the spheroradius is not below r_eq of 2 of 2 flocs")
+    assert line.startswith("warning: the spheroradius is too large to fit 2 of 2 flocs")

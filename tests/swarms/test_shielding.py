@@ -133,7 +133,7 @@ def test_all_methods_of_swarms_have_it(method):
 
 
 def test_refusals(tmp_path):
-    with pytest.raises(UsageError, match="a System does not know its clusters"):
+    with pytest.raises(UsageError, match="a System does not find clusters"):
         System(row(2), FORCES, fluid=Fluid()).run(1e-3)
     with pytest.raises(UsageError, match="would get too hot"):
         swarm_of(row(2), [*FORCES, Thermal(kick="1 ms")]).begin(1e-3)

@@ -74,5 +74,5 @@ def test_replicates_are_kicked_otherwise():
 
 @pytest.mark.parametrize("thermal", [Thermal(), Thermal(kick="1 ms", finest="2 nm")])
 def test_kicks_that_would_be_halved_are_refused(thermal):
-    with pytest.raises(UsageError, match="a swarm needs kicks of the same length"):
+    with pytest.raises(UsageError, match="need kicks of the same duration"):
         Swarm(bodies(0.0, 50.0), [StokesDrag(), thermal, Contact()], METHOD, WATER)

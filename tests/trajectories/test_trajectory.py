@@ -129,7 +129,7 @@ def test_what_cannot_be_is_told(resting):
         run.go_on(1e-4)
     with pytest.raises(UsageError, match="start must be a run of the same shapes"):
         falling(Implicit()).run(until=1.0, start=run, jit=False)
-    with pytest.raises(UsageError, match="at which start has ended"):
+    with pytest.raises(UsageError, match="the end of start"):
         system.run(until=1e-4, start=run, jit=False)
     with pytest.raises(UsageError, match=r"start must be a Trajectory, .* found State"):
         system.run(until=1.0, start=run.at("0.2 ms"), jit=False)

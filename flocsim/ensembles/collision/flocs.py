@@ -15,7 +15,7 @@ import numpy as np
 from flocsim.compiler.disk_cache import kept
 from flocsim.compiler.processor import cpu_kind, versions
 from flocsim.ensembles.config.schema import BAND, CUT, ShapesConfig
-from flocsim.errors import ConfigError
+from flocsim.errors import ConfigError, plural
 from flocsim.geometry.fit.fit import fit_mask
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, resized
@@ -134,8 +134,9 @@ def read_flocs(shapes: ShapesConfig) -> list[Floc]:
         flocs.append(floc)
     if shapes.size == "own" and len({floc.size for floc in flocs}) < 2:
         raise ConfigError(
-            f'shapes.size = "own" needs flocs of two sizes at least, but {shapes.file} holds '
-            f"{len(flocs)} of one size, which never meet: fit more flocs, or leave shapes.size out"
+            f'shapes.size = "own" needs flocs of at least two sizes, but {shapes.file} holds '
+            f"{plural(len(flocs), 'floc')} of one size, which never meet: fit more flocs, or leave "
+            "shapes.size out"
         )
     return flocs
 

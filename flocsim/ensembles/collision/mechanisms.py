@@ -75,9 +75,10 @@ class Settling(Encounter):
     def refuse(self) -> None:
         if follows_shape(self.system.forces):
             raise UsageError(
-                'two bodies that meet by settling cannot have the drag law "shape": they fall '
-                "aslant and turn as they fall, so that no offset at the start says where they meet "
-                "and none has passed for good: give another law, or let a flow bring them together"
+                'settling pairs cannot have the drag law "shape": such bodies drift sideways and '
+                "rotate as they fall, so their initial offset does not say where they meet, and a "
+                "pair that has passed may meet again; give another law, or let a flow bring the "
+                "bodies together"
             )
         if not self.speed > 0.0:
             raise UsageError(
@@ -157,9 +158,9 @@ class Weightless(Encounter):
         if drift > 1e-9 * self.speed:
             names = ", ".join(type(force).__name__ for force in self.system.forces)
             raise UsageError(
-                "without settling bodies meet without weight, but here they move against each "
-                f"other at {1e3 * drift:.3g} mm/s by other forces ({names}): leave these out, or "
-                'give scene.meeting = "settling"'
+                'unless scene.meeting = "settling", bodies have no weight, but here other forces '
+                f"({names}) move them relative to each other at {1e3 * drift:.3g} mm/s: leave "
+                "these forces out, or give that meeting"
             )
 
 
@@ -391,8 +392,8 @@ def refuse_release(options: PairScene, shapes: Sequence[Shape]) -> None:
     outer = sum(shape.bounding_radius for shape in shapes)
     if not outer < options.release * size:
         raise ConfigError(
-            f"scene.release = {options.release:g} (r_i + r_j) lets outlines touch that reach "
-            f"{outer / size:.3g} (r_i + r_j): give a larger one, and scene.escape above it"
+            f"scene.release = {options.release:g} (r_i + r_j) is too near: outlines can touch at "
+            f"{outer / size:.3g} (r_i + r_j); give a larger release, and scene.escape above it"
         )
 
 

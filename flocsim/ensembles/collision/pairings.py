@@ -18,7 +18,7 @@ import numpy as np
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, pool_of
 from flocsim.ensembles.config.pair_scene import SETTLING, PairScene
 from flocsim.ensembles.config.schema import Config
-from flocsim.errors import ConfigError
+from flocsim.errors import ConfigError, plural
 
 EXPONENTS = {"number": 0, "area": 2, "volume": 3}
 """Power of r_eq by which a floc's weight grows."""
@@ -161,8 +161,8 @@ def within_limits(scene: Any, flocs: Sequence[Floc]) -> np.ndarray:
     found = order[(sizes[order] >= low) & (sizes[order] <= high)]
     if not len(found):
         raise ConfigError(
-            "scene.min_radius and max_radius leave no floc of the library, which holds "
-            f"{len(flocs)} flocs of {in_words(sizes)}"
+            "no floc of the library lies between scene.min_radius and max_radius: it holds "
+            f"{plural(len(flocs), 'floc')} of {in_words(sizes)}"
         )
     return found
 

@@ -31,8 +31,8 @@ class KernelScene(pair_scene.PairScene):
     weight alone, or a flow alone, u = (G y, 0) or u = (s x, -s y), without weight."""
 
     sizes: tuple[float, ...] | None = field(several(pair_scene.SIZE), default=None)
-    """Ascending equivalent radii of the size classes, instead of `pairs = "measured"`, flocs of a
-    library at their own sizes, in `classes`."""
+    """Ascending equivalent radii of the size classes; or give `pairs = "measured"` (flocs of a
+    library at their own sizes) and `classes`."""
 
     start_gap: float | str = word_or_quantity(
         "auto", "m", above=0.0, at_most=pair_scene.LARGEST_LENGTH, default="auto"
@@ -41,12 +41,12 @@ class KernelScene(pair_scene.PairScene):
     `far`."""
 
     far: float = quantity("", above=0.0, at_most=0.1, default=1e-3)
-    """Speed that the forces between two bodies may cause at an automatic start, as a share of the
-    speed at which the bodies approach each other."""
+    """Speed that the forces between two bodies may cause at an automatic start, as a fraction of
+    the speed at which the bodies approach each other."""
 
     scrambles: int = field(whole(2, 64), default=8)
-    """Independent scrambles of the Sobol sequence among which the replicates are divided, from
-    whose scatter the intervals follow; replicates = scrambles times a power of 2."""
+    """Number of independent scrambles of the Sobol sequence, whose scatter gives the intervals; the
+    number of replicates must be a power of 2 times this number."""
 
     types: None = attrs.field(init=False, default=None)
     delta: tuple[float, ...] = attrs.field(init=False, default=(1.0,))
@@ -57,15 +57,15 @@ class KernelScene(pair_scene.PairScene):
 
     def __attrs_post_init__(self):
         if (self.sizes is None) == (self.pairs is None) or isinstance(self.pairs, tuple):
-            found = "neither" if self.sizes is self.pairs is None else "other pairs, or both"
+            found = "neither" if self.sizes is self.pairs is None else "both, or other pairs"
             raise ConfigError(
-                f'needs sizes, the radii of size classes, or pairs = "measured", found {found}'
+                f'needs sizes (radii of the size classes) or pairs = "measured", found {found}'
             )
         sizes = self.sizes or ()
         if list(sizes) != sorted(sizes):
             raise ConfigError("sizes must be ascending radii")
         if len(sizes) == 1 and pair_scene.SETTLING in self.meeting:
-            raise ConfigError("sizes must be several: bodies of one size settle equally fast")
+            raise ConfigError("needs two or more sizes: bodies of one size settle equally fast")
         super().__attrs_post_init__()
 
     @property

@@ -86,7 +86,7 @@ def uneven_points(config: Any, scrambles: int, of_what: str) -> Iterator[Problem
         text = f"must be {of_what} times a power of 2: found {config.replicates}, give {least} or "
         yield "replicates", f"{text}{2 * least}"
     if config.stop.half_width is not None:
-        text = "is for independent replicates, not for Sobol's points: give more replicates instead"
+        text = "is for independent replicates, not for Sobol points: give more replicates instead"
         yield "stop.half_width", text
 
 
@@ -101,7 +101,7 @@ def outline_problems(config: Any, *, settles: bool) -> Iterator[Problem]:
     words, advice = NEEDS_BOTH_SHAPES[found.acts_on]
     name = type(found).__name__
     if not settles:
-        yield "forces", f"{name} {words}, which is for pairs that settle: {advice}"
+        yield "forces", f"{name} {words}, which only settling pairs can have: {advice}"
     elif thermal_forces(config.forces):
         yield "forces.thermal", f"cannot be combined with {name}, which {words}"
 
@@ -116,7 +116,7 @@ def size_limits(low: float | None, high: float | None) -> tuple[float, float]:
 
 @attrs.frozen
 class PairScene:
-    """[scene]: who meets whom, and how the meeting begins and ends."""
+    """[scene]: which bodies meet, and how an encounter starts and ends."""
 
     without: ClassVar[frozenset[str]] = frozenset()
     """Tables and keys that such a study has no use for."""
@@ -125,15 +125,14 @@ class PairScene:
     """Where nothing is said; None for that of the key."""
 
     kind: str = choice("binary", *SCENE_WORDS, "kernel", default="binary")
-    """binary: encounters of two bodies; the other kinds have keys of their own, below."""
+    """binary: encounters of two bodies; the other kinds have their own keys, see below."""
 
     meeting: str | tuple[str, ...] = choice(*MECHANISMS, BROWNIAN, default=SETTLING)
-    """What brings the two together. settling: their weight, the faster comes from above; shear, u
-    = (G y, 0), or extension, u = (s x, -s y): a flow alone, without weight, where δ is the
-    distance to which the centres would approach each other, as a fraction of R_i + R_j;
-    brownian: thermal motion alone, without weight: released at a distance `release`, in any
-    direction, they either touch, or miss each other once they are `escape` apart; needs
-    [forces.thermal]."""
+    """What brings the two bodies together. settling: their weight; the faster one comes from above.
+    shear, u = (G y, 0), or extension, u = (s x, -s y): a flow without weight; δ is the distance to
+    which the centres would approach each other, as a fraction of R_i + R_j. brownian: thermal
+    motion without weight; the bodies are released at a distance `release` in a random direction,
+    and miss each other if they are `escape` apart before they touch; needs [forces.thermal]."""
 
     pairs: tuple[tuple[float, float], ...] | str | None = field(
         either(one_of(MEASURED), several(several(SIZE, 2, distinct=False))), default=None
@@ -160,7 +159,7 @@ class PairScene:
     of the equivalent sphere, as laser diffraction and Coulter counters report it."""
 
     min_radius: float | None = field(SIZE, **applies_with("pairs", MEASURED))
-    """Least r_eq that is drawn; none: no limit."""
+    """Smallest r_eq that is drawn; none: no limit."""
 
     max_radius: float | None = field(SIZE, **applies_with("pairs", MEASURED))
     """Largest r_eq that is drawn; none: no limit."""
@@ -193,13 +192,13 @@ class PairScene:
     """Whether the receiving body i settles or is fixed."""
 
     rate: float | None = quantity("1/s", above=0.0, **applies_with("meeting", *FLOWS))
-    """G or s of the flow; needed there."""
+    """G or s of the flow; required."""
 
     release: float = quantity(
         "", above=1.0, **applies_with("meeting", BROWNIAN, value=2.0, elsewhere=None)
     )
-    """Distance of the centres at the start, over r_i + r_j; there the outlines must not overlap at
-    any angle."""
+    """Distance of the centres at the start, over r_i + r_j; at this distance the outlines must not
+    overlap at any angle."""
 
     escape: float = quantity(
         "", above=1.0, **applies_with("meeting", BROWNIAN, value=4.0, elsewhere=None)
@@ -233,7 +232,7 @@ class PairScene:
 
     def __attrs_post_init__(self):
         if self.rate is None and applies(self.meeting, FLOWS):
-            raise ConfigError('needs rate, that of the flow, as in rate = "10 1/s"')
+            raise ConfigError('needs rate, the rate of the flow, as in rate = "10 1/s"')
         if self.meeting == BROWNIAN and not self.release < self.escape:
             raise ConfigError(f"release = {self.release:g} must be below escape = {self.escape:g}")
         if not self.is_measured:
@@ -299,7 +298,8 @@ class PairScene:
             yield "forces.drag.clusters", "is for swarms: leave it out"
         for name in ("velocity", "gradient") if self.meeting != SETTLING else ():
             if any(getattr(config.fluid, name)):
-                yield f"fluid.{name}", "would move the bodies besides scene.meeting: leave it out"
+                text = "would move the bodies in addition to scene.meeting: leave it out"
+                yield f"fluid.{name}", text
         kicks = thermal_forces(config.forces)
         if self.meeting == BROWNIAN and not kicks:
             text = '"brownian" needs kicks: add [forces.thermal], with a temperature above 0 K'

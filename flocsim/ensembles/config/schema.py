@@ -79,29 +79,28 @@ ESTIMATES = ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")
 class StopConfig:
     """[stop]: when to end before all `replicates` are run.
 
-    With `half_width`, the rule looks at fixed numbers of replicates (`least`, then 5/4 as many
-    each time), the same for any number of ranks, and the study ends at the first at which the 95 %
-    interval of every estimate in every condition is narrow enough. A condition without events
-    does not keep the study running. Like any sequential rule, it makes intervals cover a little
-    less often than they state.
+    With `half_width`, the rule is applied at fixed numbers of replicates (`least`, then 5/4 as many
+    each time), the same for any number of ranks. The study ends when the 95 % interval of every
+    probability in every condition is narrow enough. A condition without events does not keep the
+    study running. As with any sequential rule, intervals cover a little less often than 95 %.
     """
 
     half_width: float | None = quantity("", above=0.0, at_most=0.5, default=None)
     """Largest half-width of the 95 % intervals; none: run all."""
 
     of: tuple[str, ...] = field(several(one_of(*ESTIMATES)), default=("pr_inside", "pr_a"))
-    """The estimates whose intervals count."""
+    """The probabilities whose intervals must be narrow enough."""
 
     least: int = field(whole(1, 10**9), default=100)
-    """Replicates after which the rule first looks."""
+    """Replicates after which the rule is applied for the first time."""
 
     failed: float = quantity("", at_least=0.0, at_most=1.0, default=0.1)
-    """Share of all replicates that may fail; beyond it the study stops, exit code 70."""
+    """Fraction of all replicates that may fail; if more do, the study stops with exit code 70."""
 
     undecided: float = quantity("", at_least=0.0, at_most=1.0, default=MOST_UNKNOWN)
-    """Share of a condition's replicates, or of a rate's encounters, that may be undecided or
-    failed; beyond it the study is completed, but ends with exit code 65, and such rates are
-    given as intervals only."""
+    """Fraction of the replicates of a condition, or of the encounters of a rate, that may be
+    undecided or failed; if more are, the study is completed but ends with exit code 65, and such
+    rates are given as intervals only."""
 
 
 CUT, BAND = "cut", "band"
@@ -115,8 +114,8 @@ class ShapesConfig:
     own: Shape | None = attrs.field(
         default=None, kw_only=True, metadata={"key": "class", "own": (Shape,)}
     )
-    """A shape of your own instead of a `source`, the same for both bodies, scaled to their sizes;
-    its parameters are further keys, and of the keys here only `vertices` can be given with it."""
+    """Your own shape instead of a `source`, the same for both bodies, scaled to their sizes; its
+    parameters are further keys, and of the other keys only `vertices` can be given with it."""
 
     source: str | None = choice("synthetic", "library", **unless_own("synthetic"))
     """Flocs grown by flocsim, or fitted to images."""
@@ -135,28 +134,26 @@ class ShapesConfig:
     """Numbers N of vertices of the spheropolygons; 1 is the equivalent sphere."""
 
     radius: float = quantity("m", above=0.0, at_most=pair_scene.LARGEST_LENGTH, default=1e-6)
-    """Spheroradius r of the flocs after resizing."""
+    """Spheroradius r of the resized flocs."""
 
     pool: int = field(whole(1, 10**6), default=10)
     """Number of flocs, nearest in size-to-spheroradius ratio, from which each replicate draws its
     pair."""
 
     size: str = choice("scene", "own", **applies_with("source", "library", value="scene"))
-    """scene: every floc is resized to the radius required by its collision type; own: it keeps its
-    measured size and spheroradius, and is drawn from the `pool` flocs nearest to that radius,
-    or as `scene.pairs = "measured"` says, which implies "own"; the faster of the two
-    approaches."""
+    """scene: every floc is resized to the radius of its collision type; own: it keeps its measured
+    size and spheroradius, and is drawn from the `pool` flocs nearest to that radius. `scene.pairs =
+    "measured"` implies "own". With "own" the faster of the two bodies approaches the other."""
 
     pairs_alike_in: str = choice("vertices", "error", default="vertices")
-    """vertices: both flocs have N vertices; error: of the numbers of vertices with which the
-    receiver was fitted, it has the one whose relative error RE is nearest to that of the
-    approaching floc with N vertices."""
+    """vertices: both flocs have N vertices; error: the approaching floc has N vertices, and the
+    receiver the number of vertices whose relative error RE is nearest to that floc's."""
 
     outlines: str = choice(CUT, *BAND_ENDS, BAND, **applies_with("source", "library", value=CUT))
-    """cut: outlines as they were cut from the pictures; closer, wider: at the ends of their bands,
-    as another observer might have cut them; band: as cut, and every replicate is run twice
-    more, with both outlines cut closer and wider, which gives every probability of a study of
-    pairs a third error, shape; all except cut need a library made by `flocsim fit --band`."""
+    """cut: outlines as they were cut from the pictures; closer, wider: the tightest and the widest
+    outlines that another observer might have cut; band: every replicate is run with the outlines
+    as cut, and again with closer and with wider ones, which gives every probability of a study of
+    pairs a third error, shape. All except cut need a library made by `flocsim fit --band`."""
 
     fractal_dimension: float = quantity(
         "", at_least=1.2, at_most=1.95, **applies_with("source", "synthetic", value=1.8)
@@ -198,7 +195,7 @@ class ShapesConfig:
 
 @attrs.frozen
 class BodiesConfig:
-    """[bodies]: what the flocs weigh; either ``surface_density``, or ``density`` and ``depth``."""
+    """[bodies]: the weight of the flocs: ``surface_density``, or ``density`` and ``depth``."""
 
     surface_density: float | None = quantity("kg/m^2", above=0.0, default=None)
     """ρ_s: mass m = ρ_s A, A the floc's area."""
@@ -216,7 +213,8 @@ class BodiesConfig:
     def __attrs_post_init__(self):
         if (self.surface_density is None) == (self.density is None):
             example = "surface_density = 2.0 (the paper's weights), or density = 2650.0"
-            raise ConfigError(f"needs either surface_density, or density with depth: add {example}")
+            found = "neither" if self.density is None else "both"
+            raise ConfigError(f"needs surface_density or density, found {found}: give {example}")
 
 
 @attrs.frozen
@@ -237,7 +235,7 @@ class ZoneConfig:
         ),
         usual="outer",
     )
-    """d_0 is this root of attraction = repulsion; it must exist."""
+    """d_0 is this root of attraction = repulsion, which must exist."""
 
 
 METHODS: dict[str, type] = {
@@ -257,20 +255,20 @@ class IntegratorConfig:
     own: Integrator | None = attrs.field(
         default=None, kw_only=True, metadata={"key": "class", "own": (Integrator,)}
     )
-    """An integrator of your own instead of a `name`; its parameters are further keys, and of the
-    keys here only `max_steps` and `check_share` can be given with it."""
+    """Your own integrator instead of a `name`; its parameters are further keys, and of the other
+    keys only `max_steps` and `check_share` can be given with it."""
 
     name: str | None = choice(*METHODS, **unless_own("implicit"))
     """The method: see `flocsim.integrators`."""
 
     tolerance: float = quantity("m", above=0.0, default=1e-9)
-    """Largest error of a step, including the later errors that follow from it."""
+    """Largest error of a step, including its effect on later steps."""
 
     max_steps: int = field(whole(1, 10**12), default=200_000, beside_class=True)
-    """Largest number of steps of a replicate; one that has not ended by then, or has failed, is
-    tried once more with five times as many; in a swarm, the largest number that an island may
-    try from one common time to the next (for an island of more than 50 bodies this number times
-    50 over its bodies)."""
+    """Largest number of steps of a replicate. A replicate that has not ended by then, or has
+    failed, is tried once more with five times as many, and is undecided if that is not enough. In
+    a swarm, the largest number of steps of an island between two common times (for an island of n
+    > 50 bodies, 50/n times this number)."""
 
     step: float | None = quantity("s", above=0.0, default=None)
     """For methods with a fixed step."""
@@ -278,12 +276,13 @@ class IntegratorConfig:
     check_share: float | str = word_or_quantity(
         "auto", "", at_least=0.0, at_most=1.0, default="auto", beside_class=True
     )
-    """Share of the replicates that are run again at a 100 times tighter tolerance (with a fixed
+    """Fraction of the replicates that are run again at a 100 times tighter tolerance (with a fixed
     step: at a quarter of it); the outcomes that change give the numerical error of the
     probabilities. "auto": of n replicates 1.96 √(n + 3.84) − 3.84, which makes the interval of
     a flip rate of 0 as narrow as a sampling interval; where that is more than 16, at most 3.5 %
-    and at least 1 %; three times as many of the hooks, rests and misses, which flip most often;
-    one in sixteen of these is run a third time, tighter still; 0: none."""
+    and at least 1 %. Hooks, rests and misses, which flip most often, are run again three times as
+    often. One in sixteen of these runs is repeated a third time at an even tighter tolerance. 0:
+    none."""
 
     def __attrs_post_init__(self):
         if self.own is not None:
@@ -336,15 +335,15 @@ class Config:
     """Seed of all random numbers."""
 
     sampling: str = choice("random", pair_scene.SOBOL, default="random")
-    """How orientations and flocs of two bodies are drawn: independently, or evenly, by the points
-    of 16 scrambled Sobol sequences, from whose scatter the intervals follow (studies of rates
-    always use Sobol sequences)."""
+    """How the orientations and flocs of pairs are drawn. random: independently; sobol: evenly, as
+    points of 16 scrambled Sobol sequences, whose scatter gives the intervals. Kernel studies
+    always use Sobol sequences."""
 
     scene: pair_scene.PairScene = attrs.Factory(pair_scene.PairScene)
     replicates: int = field(
         whole(1, 10**9), default=attrs.Factory(usual_replicates, takes_self=True), usual=100
     )
-    """Pairs of orientations drawn per condition."""
+    """Number of runs of each condition, each with its own orientations and flocs."""
 
     shapes: ShapesConfig = attrs.Factory(ShapesConfig)
     bodies: BodiesConfig = attrs.field(kw_only=True)

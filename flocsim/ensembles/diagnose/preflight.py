@@ -55,7 +55,7 @@ def require_contact(config: Config) -> None:
     """Raise ConfigError without a contact force."""
     if not any(isinstance(force, ContactForce) for force in config.forces):
         raise ConfigError(
-            "bodies that meet need a contact force, found none among "
+            "colliding bodies need a contact force, found none among "
             f"{', '.join(config.force_names)}: add [forces.contact]"
         )
 
@@ -173,9 +173,9 @@ def impact(name: str, pair: Encounter, radii: Sequence[float]) -> Iterator[tuple
         wanted = rounded_up(getattr(alone, key) * factor)
         cure = f"give forces.contact.{key} {wanted:g} {unit} or more"
     words = (
-        f"{name}: an impact at {1e3 * speed:.4g} mm/s is {1e6 * reached:.3g} um deep, more than "
-        f"the {1e6 * deepest:.3g} um for which the contact law is valid (half of r_i + r_j, of "
-        f"outlines their spheroradii): {cure}, or lighter bodies"
+        f"{name}: an impact at {1e3 * speed:.4g} mm/s makes bodies overlap by {1e6 * reached:.3g} "
+        f"um, but the contact law is valid only up to {1e6 * deepest:.3g} um (half the sum of the "
+        f"radii, of outlines of their spheroradii): {cure}, or use lighter bodies"
     )
     yield factor, words
 

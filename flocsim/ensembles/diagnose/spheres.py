@@ -96,7 +96,7 @@ def share_in(pair: Encounter, water: bool) -> float:
     """Return the share of one pair, with the water between the two or without."""
     system = pair.system
     if words := unknown_in_water(pair):
-        raise UsageError(f"how often spheres touch in water cannot be computed {words}")
+        raise UsageError(f"the collision efficiency of spheres in water cannot be computed {words}")
     first, second = (shape.equivalent_radius for shape in pair.shapes)
     # Of flocs that water passes through the solid spheres that resist as much.
     inner = solid_radius(first, system.forces), solid_radius(second, system.forces)

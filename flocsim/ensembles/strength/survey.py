@@ -149,7 +149,7 @@ def tested_in(found: Strengths) -> dict[Bound, Opening]:
 
 IN_WORDS = (
     "opens at {0.opens:.4g} 1/s",
-    "opens at {0.opens:.4g} 1/s already, the lowest rate",
+    "already opens at {0.opens:.4g} 1/s, the lowest rate",
     "holds up to {0.holds:.4g} 1/s, the highest rate",
     "a run failed above {0.holds:.4g} 1/s",
 )

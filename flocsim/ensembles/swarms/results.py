@@ -27,7 +27,7 @@ from flocsim.ensembles.contents import (
     study_summary,
 )
 from flocsim.ensembles.kind import Condition, OldResults
-from flocsim.errors import FileError, FlocsimError, UsageError
+from flocsim.errors import FileError, FlocsimError, UsageError, plural
 from flocsim.io.groups import UNREADABLE
 from flocsim.io.labelled import Column, Labelled, about_of
 from flocsim.io.results import swarm_file
@@ -142,11 +142,11 @@ def facts_of(results: SwarmResults) -> Facts:
     events = results.groups["events"]
     before, after = events["event_before"], events["event_after"]
     return [
-        ("swarms", f"{len(radii)} of {np.count_nonzero(free)} bodies, "
-         f"{int(ends['finished'].sum())} were completed"),
+        ("swarms", f"{len(radii)} of {plural(np.count_nonzero(free), 'body', 'bodies')}, "
+         f"{int(ends['finished'].sum())} completed"),
         ("r_eq [um]", f"{radii.min():.4g} to {radii.max():.4g}, median {np.median(radii):.4g}"),
         ("box [um]", f"{width:.5g} x {height:.5g}"),
-        ("mergers", f"{np.sum(after < before)} of clusters, between snapshots"),
+        ("mergers", f"{np.sum(after < before)} of clusters between snapshots"),
         ("break-ups", f"{np.sum(after > before)}"),
         ("steps", f"{ends['steps'].sum()} of islands, {ends['body_steps'].sum()} of bodies, "
          f"{ends['rejected'].sum()} rejected"),

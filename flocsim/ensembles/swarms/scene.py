@@ -24,8 +24,8 @@ SNAPSHOTS = 10
 
 @attrs.frozen
 class SwarmScene:
-    """With `kind = "swarm"`: the number and sizes of the bodies, where they start, for how long
-    they are followed, and what is kept."""
+    """With `kind = "swarm"`: the number and sizes of the bodies, their initial positions, the
+    simulated time, and the results to store."""
 
     without: ClassVar[frozenset[str]] = frozenset({"zone", "stop", "sampling"})
     """Tables and keys that such a study has no use for."""
@@ -45,9 +45,8 @@ class SwarmScene:
     """Bodies of each replicate."""
 
     area_fraction: float | None = quantity("", above=0.0, at_most=0.9, default=None)
-    """Share of the box that bodies cover at the start; it sets the size of the box, which is as
-    high as it is wide unless `aspect` says otherwise. Placed at random one after another, flocs
-    reach about 0.3."""
+    """Fraction of the box that bodies cover at the start; it sets the size of the box, which is
+    square unless `aspect` is given. Flocs, placed at random one after another, reach about 0.3."""
 
     box: tuple[float, float] | None = field(BOX, default=None)
     """Width and height of the box, instead of `area_fraction`."""
@@ -56,16 +55,16 @@ class SwarmScene:
     """Height of the box over its width."""
 
     periodic: str = choice("xy", "x", "none", default="xy")
-    """Axes along which the box is periodic; along the others bodies start inside it, and may leave
-    it."""
+    """Axes along which the box is periodic; along the others bodies start inside the box and may
+    leave it."""
 
     floor: bool = flag(default=False)
     """A fixed wall below the box, which must not be periodic in y."""
 
     leaving: str = choice("keep", "remove", "reenter", default="keep")
     """What happens to clusters that leave through a side at which the box is not periodic: keep:
-    they continue outside; remove: they are taken out; reenter: they come in again at the
-    opposite side."""
+    they continue outside; remove: they are removed; reenter: they enter again at the opposite
+    side."""
 
     radius: float | None = field(SIZE, default=None)
     """Median equivalent radius; without it, bodies are measured flocs of a library, each at its
@@ -79,19 +78,19 @@ class SwarmScene:
     proportion to r_eq² or r_eq³."""
 
     min_radius: float | None = field(SIZE, default=None)
-    """Least r_eq that is drawn; none: no limit."""
+    """Smallest r_eq that is drawn; none: no limit."""
 
     max_radius: float | None = field(SIZE, default=None)
     """Largest r_eq that is drawn; none: no limit."""
 
     gap: float = quantity("m", at_least=0.0, default=0.0)
-    """Least distance of outlines at the start."""
+    """Smallest distance of outlines at the start."""
 
     duration: float = quantity("s", above=0.0, default=1.0)
     """Simulated time."""
 
     every: float | str = word_or_quantity("auto", "s", above=0.0, default="auto")
-    """Time between two snapshots; auto: 10 of them."""
+    """Time between two snapshots; auto: a tenth of `duration`."""
 
     link: float = quantity("m", at_least=0.0, default=0.0)
     """Bodies nearer to each other than this belong to one cluster; 0: those that touch."""
@@ -111,7 +110,7 @@ class SwarmScene:
             found = "neither" if self.box is None else "both"
             raise ConfigError(f"a swarm needs area_fraction or box, found {found}")
         if self.box is not None and self.aspect != 1.0:
-            raise ConfigError("aspect belongs to area_fraction: box gives the height already")
+            raise ConfigError("aspect goes with area_fraction: box already gives the height")
         if self.periodic == "xy" and (self.floor or self.leaving != "keep"):
             key = "floor = true" if self.floor else f'leaving = "{self.leaving}"'
             raise ConfigError(
@@ -156,14 +155,14 @@ class SwarmScene:
         yield from outline_problems(config, settles=False)
         for name, force in zip(config.force_names, config.forces, strict=True):
             if has_unlike_potentials(force):
-                text = "is given for two unlike bodies: those of a swarm are alike"
+                text = "must be one number in a swarm, whose bodies are alike"
                 yield f"forces.{name}.potential", text
         shapes = config.shapes
         if len(shapes.vertices) > 1:
             text = f"must be one number in a swarm, found {list(shapes.vertices)}"
             yield "shapes.vertices", text
         if shapes.pairs_alike_in == "error":
-            yield "shapes.pairs_alike_in", "is for pairs, which a swarm does not have"
+            yield "shapes.pairs_alike_in", "is for studies of pairs: leave it out of a swarm"
         if self.is_measured and shapes.source != "library":
             text = 'needs radius, the median r_eq, or measured flocs (shapes.source = "library")'
             yield "scene", text

@@ -97,8 +97,7 @@ def too_long(shape: Shape, kappa: float, takes: str) -> ShapeError:
     return ShapeError(
         f"the outline of a body of r_eq = {shape.equivalent_radius:.3g} m, rounded by "
         f"{radius:.3g} m, is too long for a double layer of 1/κ = {1.0 / kappa:.3g} m along "
-        f'outlines (it takes {takes} at most): give gap = "surface" in the place of '
-        'law = "outline"'
+        f'outlines (it needs {takes} at most): give gap = "surface" instead of law = "outline"'
     )
 
 

@@ -295,7 +295,7 @@ def overlap_fault(
             return f"overlapping by {overlap:.3g} m, more than half of r_i + r_j"
         if overlap > along_outlines:
             return (
-                f"overlapping by {overlap:.3g} m, beyond d_min = {along_outlines:.3g} m of the "
+                f"overlapping by {overlap:.3g} m, more than d_min = {along_outlines:.3g} m of the "
                 "force along their outlines"
             )
     return None

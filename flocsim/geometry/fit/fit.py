@@ -125,14 +125,14 @@ def fit_mask(
         return _equal_area_circle(floc)
     if inscribed and (method != "pattern" or preserve_area):
         raise UsageError(
-            "an inscribed fit goes with the method 'pattern' and without preserving the area, "
-            f"found the method {method!r}, preserve_area {preserve_area}"
+            "an inscribed fit needs method='pattern' and preserve_area=False, found "
+            f"{method!r} and {preserve_area}"
         )
     equivalent = np.sqrt(floc.sum() / np.pi)
     if radius >= equivalent and preserve_area:
         raise UsageError(
-            f"the area cannot be preserved: a disk of spheroradius {radius:g} px alone covers more "
-            f"than the floc of r_eq = {equivalent:.2f} px; use r < r_eq"
+            f"the area cannot be preserved: a single disk with the spheroradius {radius:g} px is "
+            f"larger than the floc of r_eq = {equivalent:.2f} px; use r < r_eq"
         )
     if radius >= equivalent:
         warnings.warn(

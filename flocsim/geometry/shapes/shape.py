@@ -248,8 +248,7 @@ def swept_parts(parts: Sequence[Part]) -> Swept:
     parts = tuple(checked_part(part) for part in parts)
     if len(parts) > 1 and len(loose := loose_parts(parts, TOUCHING)):
         raise ShapeError(
-            f"part {loose[0]} of {len(parts)} touches none of those that hang together with the "
-            "first: move it nearer"
+            f"part {loose[0]} of {len(parts)} is not connected to the first part: move it nearer"
         )
     points = parts[0].points if len(parts) == 1 else np.concatenate([p.points for p in parts])
     # A unit-sized copy keeps fourth powers of micrometres far from underflow.

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Sequence
 import attrs
 import numpy as np
 
-from flocsim.errors import ImageError
+from flocsim.errors import ImageError, plural
 from flocsim.io.images.background import (
     low_pass,
     robust_deviation,
@@ -92,19 +92,17 @@ class Segmentation:
         found = []
         kept, left = (sum(each.area for each in some) for some in (self.regions, self.rejected))
         if left > kept:
-            found.append(f"{100 * left / (kept + left):.0f} % of the area is left out")
+            found.append(f"{100 * left / (kept + left):.0f} % of the area was rejected")
         pieces = len(self.regions) + len(self.rejected)
         if pieces >= MANY_PIECES:
             # Gaps of up to 2 APART pixels are none.
             bodies = int(label(binary_dilation(self.foreground, iterations=APART))[1])
             if pieces >= MANY_PIECES * bodies:
-                found.append(f"{pieces} pieces lie as if broken from {bodies}")
+                found.append(f"{pieces} regions look like fragments of {plural(bodies, 'floc')}")
         bands = [each.band for each in self.regions if each.band is not None]
         undecided = sum(int(outer.sum()) - int(inner.sum()) for inner, outer in bands)
         if bands and undecided > UNDECIDED * kept:
-            found.append(
-                f"outlines are undecided over {100 * undecided / kept:.0f} % of their area"
-            )
+            found.append(f"outlines are uncertain by {100 * undecided / kept:.0f} % of their area")
         return found
 
     def rejected_by_reason(self) -> dict[str, int]:

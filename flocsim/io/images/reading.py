@@ -275,7 +275,7 @@ def inverted(pixels, path):
         return ~pixels
     if pixels.dtype.kind == "u":
         return np.iinfo(pixels.dtype).max - pixels
-    raise ImageError(f"{path}: 0 is white in it, and values are {pixels.dtype}: no black is known")
+    raise ImageError(f"{path}: 0 is white, but of {pixels.dtype} values no value is known as black")
 
 
 def one_line(problem: Exception) -> str:

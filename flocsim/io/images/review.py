@@ -14,7 +14,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import FileError, UsageError, plural
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.reading import check_file
 from flocsim.io.images.regions import Region
@@ -75,7 +75,7 @@ def read_choices(path: str) -> dict[str, Choices]:
             raise ValueError(f"it is larger than {LARGEST >> 20} MB")
         pictures = read_json(text, FORM)["pictures"]
         if not {each["choice"] for one in pictures for each in one["flocs"]} <= {KEEP, REJECT}:
-            raise ValueError(f"a choice in it is neither {KEEP!r} nor {REJECT!r}")
+            raise ValueError(f"a choice is neither {KEEP!r} nor {REJECT!r}")
     except OSError as error:
         raise FileError(f"{path} could not be read: {error.strerror}; check the path") from error
     except ValueError as error:
@@ -98,13 +98,13 @@ def judged(path: str, found: Choices, by_eye: Choices | None) -> Choices:
     what was found in it."""
     name = found["picture"]
     if by_eye is None:
-        raise misfit(path, f"it has no choices for {name}")
+        raise misfit(path, f"there are no choices for {name}")
     if by_eye["sha256"] != found["sha256"]:
-        raise misfit(path, f"{name} was another file, or has changed since")
+        raise misfit(path, f"{name} is another file, or has changed since then")
     ours, theirs = found["flocs"], by_eye["flocs"]
     if len(ours) != len(theirs):
-        counts = f"is {len(ours)}, and was {len(theirs)}"
-        raise misfit(path, f"the number of regions in {name} {counts}")
+        counts = f"{plural(len(ours), 'region')} now, but {len(theirs)} then"
+        raise misfit(path, f"{name} has {counts}")
     for one, other in zip(ours, theirs, strict=True):
         if not is_same(one, other):
             raise misfit(path, f"floc {one['floc']} of {name} is not the one that was judged")

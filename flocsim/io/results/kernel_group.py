@@ -23,7 +23,7 @@ ESTIMATES = {
     "alpha": (
         "f8",
         "1",
-        "efficiency: encounters that aggregate of those that touch, in the plane",
+        "efficiency: fraction of touching encounters that aggregate, in the plane",
     ),
     "efficiency2": ("f8", "1", "beta2 over beta2_reference"),
     "efficiency3": ("f8", "1", "beta3 over beta3_reference"),
@@ -32,21 +32,21 @@ BOUNDS = {
     "": "",
     "_low": ", lower 95 % bound, undecided and failed points counted as misses",
     "_high": ", upper 95 % bound, undecided and failed points counted as captures",
-    "_numerical": ", its change by numerical error: 95 % bound",
-    "_change_low": ", its change if all runs were exact: lower 95 % bound",
-    "_change_high": ", its change if all runs were exact: upper 95 % bound",
+    "_numerical": ", 95 % bound of its change if all runs were exact (numerical error)",
+    "_change_low": ", change if all runs were exact: lower 95 % bound",
+    "_change_high": ", change if all runs were exact: upper 95 % bound",
 }
 FLIPS = {
-    f"flips_{k}": ("f8", "1", f"share of points run again that flip: encounters {v} or not")
+    f"flips_{k}": ("f8", "1", f"fraction of points run again that flip: encounters {v}, or not")
     for k, v in WHAT.items()
 }
 BESIDES = {
     "beta2_reference": ("f8", "m2 s-1", "rectilinear kernel of the equivalent spheres, in a plane"),
     "beta3_reference": ("f8", "m3 s-1", "rectilinear kernel of the equivalent spheres"),
-    "speed": ("f8", "m s-1", "relative settling speed of the pair; in a flow rate times r_i + r_j"),
+    "speed": ("f8", "m s-1", "relative settling speed; in a flow, its rate times r_i + r_j"),
     "checked": ("f8", "1", "points that were run again at a tighter tolerance"),
-    "undecided": ("f8", "1", "share of the sampled flux whose encounters are undecided or failed"),
-    "edge": ("f8", "1", "share of what aggregates that came from the outermost tenth of the "
+    "undecided": ("f8", "1", "fraction of the sampled flux that is undecided or failed"),
+    "edge": ("f8", "1", "fraction of aggregating encounters from the outermost tenth of the "
         "offsets sampled because of attraction; if not 0, the width may be cut off"),
 }  # fmt: skip
 KERNEL = {

@@ -29,7 +29,7 @@ AXES = ("type", "vertices", "delta")
 SHAPE_MEASURES = {
     "aspect_ratio": "aspect ratio",
     "circularity": "circularity 4 pi A/P^2",
-    "solidity": "solidity, the share of the convex hull,",
+    "solidity": "solidity (area over area of the convex hull)",
 }
 """Of the outlines of both bodies, as they were run (`flocsim.geometry.shapes.outline`)."""
 
@@ -71,19 +71,19 @@ REPLICATES = {  # name: (dtype, units, long name)
     "crossed_zone": ("u1", "1", "centre distance crossed D_0 after the collision"),
     "bond": ("u1", "1", "what holds an aggregated pair"),
     **formed(ENDED, {"checked_{}": "{}, when run again at a tighter tolerance"}, "u1"),
-    **formed(ENDED, {"third_{}": "{}, in the third run, at a tolerance tighter still"}, "u1"),
+    **formed(ENDED, {"third_{}": "{}, in the third run, at an even tighter tolerance"}, "u1"),
     "d_c_collision": ("f8", "m", "centre distance at the collision"),
     "d_c_over_D_0": ("f8", "1", "centre distance at the collision over D_0"),
     "d_c_max": ("f8", "m", "largest centre distance after the collision"),
     "d_c_last": ("f8", "m", "last centre distance"),
     "t_collision": ("f8", "s", "time of the collision"),
-    "t_end": ("f8", "s", "time of the decision"),
+    "t_end": ("f8", "s", "time at which the outcome was decided"),
     "steps": ("i8", "1", "accepted integrator steps"),
     "rejected": ("i8", "1", "rejected integrator steps"),
     "error": ("f8", "m", "stated error of position at the end"),
-    "failure": ("u1", "1", "reason of an undecided or failed outcome"),
-    "floc_i": ("i4", "1", "floc of the receiving body, a place in /flocs; -1 for a sphere"),
-    "floc_j": ("i4", "1", "floc of the approaching body, a place in /flocs; -1 for a sphere"),
+    "failure": ("u1", "1", "reason for an undecided or failed outcome"),
+    "floc_i": ("i4", "1", "floc of the receiving body, as an index of /flocs; -1: a sphere"),
+    "floc_j": ("i4", "1", "floc of the approaching body, as an index of /flocs; -1: a sphere"),
     **formed(SHAPE_MEASURES, {f"{{}}_{body}": f"{{}} of body {body}, as run" for body in "ij"}),
     **formed(ENDED, {"closer_{}": "{}, both outlines cut closer"}, "u1"),
     **formed(ENDED, {"wider_{}": "{}, both outlines cut wider"}, "u1"),
@@ -106,7 +106,7 @@ def last_axis(name: str) -> tuple[str, ...]:
 COUNTS = {
     "n_total": "replicates",
     "n_missed": "replicates whose bodies parted without touching",
-    "n_held": "replicates whose bodies rest over each other without touching",
+    "n_held": "replicates whose bodies come to rest one above the other without touching",
     "n_undecided": "replicates that ran out of time or steps",
     "n_failed": "replicates that ended in an error",
     "n_collided": "replicates whose outlines touched",
@@ -114,10 +114,10 @@ COUNTS = {
     "n_class": "collisions of each class",
     "n_bond": "aggregated replicates of each kind of bond",
     "n_checked": "replicates that were run again at a tighter tolerance",
-    "n_flipped": "replicates run again that ended with another outcome, or on the other side of "
-    "the zone",
-    "n_third": "of these, replicates that were run a third time",
-    "n_third_flipped": "of these, replicates whose third run ended otherwise than the second",
+    "n_flipped": "replicates whose second run had another outcome, or was on the other side of the "
+    "zone",
+    "n_third": "replicates that were run a third time",
+    "n_third_flipped": "replicates whose third run ended differently from the second",
 }
 PROBABILITIES = {
     "pr_inside": "Pr[inside | collision]",
@@ -130,16 +130,16 @@ PROBABILITIES = {
     "pr_bond": "Pr[bond | aggregation]",
 }
 CHANGES = {
-    "n_checked_{}": "replicates run again that count in {} in either run",
-    "n_gained_{}": "of these, raised {} when run again",
-    "n_lost_{}": "of these, lowered {} when run again",
+    "n_checked_{}": "replicates run twice of which either run counts in {}",
+    "n_gained_{}": "replicates whose second run raised {}",
+    "n_lost_{}": "replicates whose second run lowered {}",
 }
 """What is counted for every probability, beside `COUNTS`."""
 BOUNDS = {
     "{}": "{}",
     "{}_low": "{}, lower 95 % bound",
     "{}_high": "{}, upper 95 % bound",
-    "{}_numerical": "{}, numerical error: 95 % bound of its change, run exactly",
+    "{}_numerical": "{}, 95 % bound of its change if all runs were exact (numerical error)",
 }
 TABLE = {
     **formed(COUNTS, {"{}": "{}"}, "i8"),
@@ -151,19 +151,19 @@ POOLED_PROBABILITIES = tuple(name for name in PROBABILITIES if not last_axis(nam
 POOLED_TEXTS = {name: PROBABILITIES[name] for name in POOLED_PROBABILITIES}
 POOLED = {
     **formed({k: f"{v}, all displacements pooled" for k, v in POOLED_TEXTS.items()}, BOUNDS),
-    **formed(POOLED_TEXTS, {"n_effective_{}": "independent events that {} is worth"}),
+    **formed(POOLED_TEXTS, {"n_effective_{}": "effective number of independent events of {}"}),
 }
-CHANGE = "by how much {} would change, "
+CHANGE = "change of {} "
 NUMERICS = formed(PROBABILITIES, {
-    "{}_change_low": CHANGE + "run exactly: lower 95 % bound",
-    "{}_change_high": CHANGE + "run exactly: upper 95 % bound",
+    "{}_change_low": CHANGE + "if all runs were exact: lower 95 % bound",
+    "{}_change_high": CHANGE + "if all runs were exact: upper 95 % bound",
 })  # fmt: skip
 """The numerical error as a signed change of every probability of `PROBABILITIES`."""
 OUTLINES = formed(PROBABILITIES, {
-    "{}_closer": CHANGE + "all outlines cut closer",
-    "{}_wider": CHANGE + "all outlines cut wider",
-    "{}_shape_low": CHANGE + "outlines cut within their bands: lower 95 % bound",
-    "{}_shape_high": CHANGE + "outlines cut within their bands: upper 95 % bound",
+    "{}_closer": CHANGE + "with all outlines cut closer",
+    "{}_wider": CHANGE + "with all outlines cut wider",
+    "{}_shape_low": CHANGE + "with outlines cut within their bands: lower 95 % bound",
+    "{}_shape_high": CHANGE + "with outlines cut within their bands: upper 95 % bound",
 })  # fmt: skip
 """The error by the shape: what the ends of the outlines' bands make of every probability."""
 PER_APPROACH = "pr_a_per_approach"
@@ -173,7 +173,7 @@ COMPARED = POOLED_TEXTS | {PER_APPROACH: "Pr[aggregation | decided approach]"}
 """{name: meaning} of the probabilities that are compared."""
 DIFFERENCES = {
     "n_pairs": ("i8", "1", "replicates that count in both conditions"),
-    "difference": ("f8", "1", "probability here minus that in the condition compared with"),
+    "difference": ("f8", "1", "probability in this condition minus that in the compared one"),
     "difference_low": ("f8", "1", "difference, lower 95 % bound of the paired interval"),
     "difference_high": ("f8", "1", "difference, upper 95 % bound of the paired interval"),
 }
@@ -194,7 +194,7 @@ for run in FURTHER_RUNS:
 COORDINATES = {
     "type": ("text", "1", "collision type, pair of equivalent radii (i-j) or of size classes"),
     "vertices": ("i8", "1", "vertices N of each body; 1 is the equivalent sphere"),
-    "delta": ("f8", "1", "horizontal displacement of the centres as a share of delta_max"),
+    "delta": ("f8", "1", "horizontal displacement of the centres as a fraction of delta_max"),
     "class": (
         "text",
         "1",
@@ -203,14 +203,14 @@ COORDINATES = {
     "bond": (
         "text",
         "1",
-        "certificate: no later load can open it; hook: at rest, and the contacts carry the load, "
-        "as statics shows, where attraction could not; rest: it has kept its pose under its load, "
-        "without such a proof",
+        "certificate: no later load can open it; hook: statics shows that the contacts carry the "
+        "load, which attraction alone could not; rest: the pose was stable under the load, without "
+        "such a proof",
     ),
     "replicate": ("i8", "1", "replicate index"),
     "floc": ("text", "1", "name of the floc"),
     "against": ("text", "1", "compared with the condition that comes first along this axis"),
-    "event": ("text", "1", "inside: of all collisions; aggregated: of the decided ones"),
+    "event": ("text", "1", "inside: of all collisions; aggregated: of the decided collisions"),
 }
 
 RADII = {

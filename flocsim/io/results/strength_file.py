@@ -29,36 +29,36 @@ failed."""
 OPENED, OPENS_AT_LEAST, HOLDS, FAILED = range(len(STATUS))
 
 DOUBLETS = {
-    "type": ("i8", "1", "place of the collision type in the study"),
-    "vertices": ("i8", "1", "place of N in the study"),
-    "delta": ("i8", "1", "place of the displacement in the study"),
+    "type": ("i8", "1", "index of the collision type in the study"),
+    "vertices": ("i8", "1", "index of N in the study"),
+    "delta": ("i8", "1", "index of the displacement in the study"),
     "replicate": ("i8", "1", "replicate of the study"),
     "bond": ("u1", "1", "what holds the pair"),
     "holds": ("f8", "s-1", "highest rate below the first opening at which it held; NaN: none"),
-    "opens": ("f8", "s-1", "first rate found at which it opens; NaN: none"),
-    "status": ("u1", "1", "what was found"),
-    "runs": ("i8", "1", "rates at which it was run"),
-    "tolerance": ("f8", "m", "largest tolerance that one of its runs needed; NaN: unknown"),
+    "opens": ("f8", "s-1", "lowest rate found at which it opens; NaN: none"),
+    "status": ("u1", "1", "result of the test"),
+    "runs": ("i8", "1", "number of rates at which it was run"),
+    "tolerance": ("f8", "m", "largest tolerance among its runs; NaN: unknown"),
 }
 """Columns (doublet,): {name: (type, units, long name)}."""
 
 COUNTS = {
-    "n_bound": ("i8", "1", "doublets found bound"),
-    "n_tested": ("i8", "1", "doublets put into flows"),
+    "n_bound": ("i8", "1", "bound doublets"),
+    "n_tested": ("i8", "1", "tested doublets"),
     "n_opened": ("i8", "1", "doublets that opened"),
-    "n_holding": ("i8", "1", "doublets that held at every rate"),
+    "n_holding": ("i8", "1", "doublets that did not open at any rate"),
     "n_failed": ("i8", "1", "doublets with a failed run"),
 }
 """Columns (type, vertices, delta) of ``conditions``."""
 
-RATE = {"rate": ("f8", "s-1", "rate at which a share of the doublets has opened; inf: none")}
+RATE = {"rate": ("f8", "s-1", "rate at which a fraction of the doublets has opened; inf: none")}
 """The column (type, vertices, delta, quantile)."""
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 SCALES = COORDINATES | {
     "doublet": ("i8", "1", "number of the doublet"),
-    "quantile": ("f8", "1", "share of the doublets"),
+    "quantile": ("f8", "1", "fraction of the doublets"),
 }
 CODES = {"bond": FLAGS["bond"], "status": (range(len(STATUS)), STATUS)}
 

@@ -20,20 +20,20 @@ WALL = -2
 
 MOMENTS = ("replicate", "time")
 COUNTS = {
-    "clusters": ("f8", "1", "clusters, single bodies among them"),
+    "clusters": ("f8", "1", "clusters, including single bodies"),
     "largest": ("f8", "1", "bodies of the largest cluster"),
     "mean_size": ("f8", "1", "body-weighted mean cluster size"),
     "percolating": ("f8", "1", "clusters connected to their own images around the box"),
-    "gyration": ("f8", "m", "mass-weighted mean radius of gyration; without percolating clusters"),
-    "porosity": ("f8", "1", "1 - area/area of the convex hull, mean over the same clusters"),
-    "fractal_dimension": ("f8", "1", "slope of log mass over log radius of gyration of clusters"),
-    "settling": ("f8", "m s-1", "downward velocity of clusters, mass-weighted mean"),
+    "gyration": ("f8", "m", "mass-weighted mean radius of gyration, without percolating clusters"),
+    "porosity": ("f8", "1", "mean of 1 - area/area of the convex hull, likewise"),
+    "fractal_dimension": ("f8", "1", "slope of log mass against log radius of gyration"),
+    "settling": ("f8", "m s-1", "mass-weighted mean downward velocity of clusters"),
     "bonds_certificate": ("f8", "1", "touching pairs that no later load can separate"),
     "bonds_hook": ("f8", "1", "touching pairs at rest whose contacts carry the load"),
-    "bonds_rest": ("f8", "1", "touching pairs that have kept their pose, without such a proof"),
-    "bonds_touching": ("f8", "1", "touching pairs without any proof"),
+    "bonds_rest": ("f8", "1", "touching pairs with a stable pose, without such a proof"),
+    "bonds_touching": ("f8", "1", "touching pairs without a known bond"),
     "removed": ("f8", "1", "bodies that have left the box for good"),
-    "reentered": ("f8", "1", "how often bodies have left the box and re-entered"),
+    "reentered": ("f8", "1", "number of times that bodies left the box and re-entered"),
     "median_error": ("f8", "m", "median over bodies of the stated error of position"),
     "error": ("f8", "m", "largest stated error of position of a body"),
 }  # fmt: skip
@@ -45,15 +45,13 @@ SNAPSHOTS = {
 }
 """Columns (replicate, time, body, component)."""
 
-CLUSTER = {
-    "cluster": ("i4", "1", "cluster of a body at that time; -1: a wall, or not known; -2: it left")
-}
+CLUSTER = {"cluster": ("i4", "1", "cluster of a body; -1: a wall, or unknown; -2: left the box")}
 GONE = -2
 """The cluster of a body that has left the box for good."""
 
 BONDS = {
     "bond_replicate": ("i4", "1", "replicate of the pair"),
-    "bond_time": ("i4", "1", "place of the snapshot among the times"),
+    "bond_time": ("i4", "1", "index of the snapshot along the times"),
     "bond_later": ("i4", "1", "second of two bodies that touch"),
     "bond_earlier": ("i4", "1", "first of the two"),
     "bond_kind": ("i4", "1", "0 touching, 1 certificate, 2 hook, 3 rest"),
@@ -62,35 +60,35 @@ BONDS = {
 
 CLUSTERS = {
     "cluster_replicate": ("i4", "1", "replicate of the cluster"),
-    "cluster_time": ("i4", "1", "place of the snapshot among the times"),
-    "cluster_number": ("i4", "1", "its number in snapshots/cluster"),
+    "cluster_time": ("i4", "1", "index of the snapshot along the times"),
+    "cluster_number": ("i4", "1", "number of the cluster in snapshots/cluster"),
     "cluster_bodies": ("i4", "1", "bodies of the cluster"),
     "cluster_mass": ("f8", "kg", "mass"),
     "cluster_gyration": ("f8", "m", "radius of gyration; NaN: it percolates"),
     "cluster_hydrodynamic": ("f8", "m", "hydrodynamic radius of spheres of r_eq; NaN: percolates"),
-    "cluster_speed": ("f8", "m s-1", "downward velocity of its centre of mass"),
+    "cluster_speed": ("f8", "m s-1", "downward velocity of the centre of mass"),
     "cluster_porosity": ("f8", "1", "1 - area/area of the convex hull; NaN: it percolates"),
-    "cluster_bonds": ("i4", "1", "pairs of its bodies that touch"),
+    "cluster_bonds": ("i4", "1", "touching pairs in the cluster"),
 }  # fmt: skip
 """Columns (row,): every cluster at all times of all replicates."""
 
 EVENTS = {
     "event_replicate": ("i4", "1", "replicate of the clusters"),
-    "event_time": ("i4", "1", "place of the first snapshot after it among the times"),
+    "event_time": ("i4", "1", "index of the first snapshot after it"),
     "event_before": ("i4", "1", "clusters before"),
     "event_after": ("i4", "1", "clusters after; fewer: they merged, more: they broke up"),
     "event_bodies": ("i4", "1", "bodies of these clusters"),
-    "event_largest": ("i4", "1", "bodies of the largest of the clusters, of the side with more"),
-    "event_second": ("i4", "1", "bodies of the second largest of them"),
+    "event_largest": ("i4", "1", "bodies of the largest cluster on the side with more clusters"),
+    "event_second": ("i4", "1", "bodies of the second largest cluster on that side"),
 }  # fmt: skip
 """Columns (event,)."""
 
 BODIES = {
     "r_eq": ("f8", "m", "equivalent radius"),
-    "spheroradius": ("f8", "m", "radius of the disk that sweeps the core, the least of its parts"),
+    "spheroradius": ("f8", "m", "radius of the disk that sweeps the core (smallest part)"),
     "mass": ("f8", "kg", "mass"),
-    "floc": ("i4", "1", "floc of the library or the pool; -1 a sphere, -2 a wall"),
-    "first_point": ("i8", "1", "place in points of the first core point"),
+    "floc": ("i4", "1", "index of the floc in the library or the pool; -1: a sphere, -2: a wall"),
+    "first_point": ("i8", "1", "index of the first core point in points"),
     "point_count": ("i8", "1", "number of core points"),
 }
 """Columns (replicate, body)."""
@@ -106,7 +104,7 @@ RINGS = {
 BOX = {"box": ("f8", "m", "width and height of the box")}
 ENDS = {
     "finished": ("i4", "1", "1: finished; 0: stopped early"),
-    "end_time": ("f8", "s", "time at which it ended"),
+    "end_time": ("f8", "s", "time at which the replicate ended"),
     "steps": ("i8", "1", "accepted steps of islands"),
     "rejected": ("i8", "1", "rejected steps of islands"),
     "body_steps": ("i8", "1", "accepted steps times the bodies of their islands"),
@@ -119,10 +117,10 @@ ROW = np.dtype([(name, f"<{kind}") for name, (kind, *_) in ENDS.items()])
 SCALES = {
     "replicate": ("i8", "1", "number of the replicate"),
     "time": ("f8", "s", "time since the start"),
-    "class": ("f8", "m", "least equivalent radius of the size class"),
+    "class": ("f8", "m", "smallest equivalent radius of the size class"),
     "body": ("i8", "1", "number of the body"),
-    "component": ("text", "1", "of a place, and of its rate"),
-    "axis": ("text", "1", "of a point"),
+    "component": ("text", "1", "component of the position or velocity"),
+    "axis": ("text", "1", "coordinate of a point"),
     "point": ("i8", "1", "number of the core point"),
     "bond": ("i8", "1", "number of the pair"),
     "row": ("i8", "1", "number of the row"),

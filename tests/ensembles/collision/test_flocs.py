@@ -139,7 +139,9 @@ def test_two_flocs_of_one_measured_size_are_no_pair():
 def test_a_library_of_one_measured_size_is_refused(tmp_path):
     write_star_library(tmp_path / "one.h5", vertices=(4,), ratios=(8.0,))
     shapes = ShapesConfig(source="library", file=tmp_path / "one.h5", vertices=(4,), size="own")
-    with pytest.raises(ConfigError, match=r"needs flocs of two sizes at least, but .* holds 1 of"):
+    with pytest.raises(
+        ConfigError, match=r"needs flocs of at least two sizes, but .* holds 1 floc of"
+    ):
         load_flocs(shapes, 1)
 
 

@@ -116,7 +116,7 @@ def test_a_quantile_is_never_a_floc_without_weight(number):
 @pytest.mark.parametrize(
     ("words", "why"),
     [
-        ({"min_radius": 20e-6}, "leave no floc of the library, which holds 6 flocs of 2 to 12 um"),
+        ({"min_radius": 20e-6}, "max_radius: it holds 6 flocs of 2 to 12 um"),
         ({"classes": (3e-6,)}, "class to3um holds 1 of one size, which never meet"),
         ({"classes": (15e-6,)}, "class from15um holds 0, which never meet"),
         ({"classes": 6}, "class q1 holds 1 of one size"),

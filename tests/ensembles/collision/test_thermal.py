@@ -237,7 +237,7 @@ def test_shapes_come_round_what_acts_between_their_centres(tmp_path):
 
 def test_a_release_at_which_outlines_would_touch_is_refused(tmp_path):
     rod = SpheroPolygon([(-9e-6, 0.0), (9e-6, 0.0)], 5e-7)
-    with pytest.raises(UsageError, match=r"scene.release = 2 \(r_i \+ r_j\) lets outlines touch"):
+    with pytest.raises(UsageError, match=r"scene.release = 2 \(r_i \+ r_j\) is too near: outlines"):
         Pair(tmp_path, BROWNIAN, shapes=[rod, rod])
 
 

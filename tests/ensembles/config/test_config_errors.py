@@ -44,7 +44,7 @@ WRONG = {
     "[shapes]\nsource = 'library'\nfile = ''": "shapes.file must be a string that is not blank",
     "[shapes]\nfractal_dimension = 2": "at least 1.2 and at most 1.95, found 2",
     "[bodies]\ndensity = 1\nsurface_density = 1": "bodies.density: excludes surface_density",
-    "[bodies]\ndepth = '5 um'": "bodies: needs either surface_density, or density",
+    "[bodies]\ndepth = '5 um'": "bodies: needs surface_density or density, found neither",
     "[bodies]\ndensity = "
     + "9" * 400: "bodies.density must be a finite number above 0 [kg/m^3], found 9",
     "[fluid]\nbuoyancy = true": "fluid.buoyancy: true needs bodies.density",
@@ -72,7 +72,7 @@ WRONG = {
     "[scene]\nkind = 'swarn'": f"scene.kind must be {KINDS}, found 'swarn'",
     "[scene]\nmeeting = 'swarm'": "scene.meeting must be 'settling', 'shear', 'extension' or ",
     "[scene]\nmeeting = ['shear']": "scene.meeting must be 'settling', 'shear', 'extension' or ",
-    "[scene]\nmeeting = 'shear'": "scene: needs rate, that of the flow, as in rate =",
+    "[scene]\nmeeting = 'shear'": "scene: needs rate, the rate of the flow, as in rate =",
     "[zone]\nroot = 'inner'\ncentre = 1e-5": "zone.centre: excludes root, which is given too",
     "[zone]\ndistance = -1e-9": "must be a finite number at least 0 [m], found -1e-09",
     "[integrator]\nmax_steps = 1e6": "integrator.max_steps must be an integer",
@@ -108,9 +108,9 @@ def test_all_problems_at_once_in_the_order_of_the_file(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", ["bodies: needs either surface_density", "forces: there are none: add"]),
+        ("", ["bodies: needs surface_density", "forces: there are none: add"]),
         ("[bodies]\nsurface_density = 2\n", ["forces: there are none: add [forces.gravity]"]),
-        ("[forces.drag]\n", ["bodies: needs either surface_density"]),
+        ("[forces.drag]\n", ["bodies: needs surface_density"]),
         ('preset = "ti"\n', ["preset must be"]),
     ],
 )

@@ -49,7 +49,7 @@ def test_measured_classes_have_their_pairs(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"meeting": '"shear"'}, 'needs rate, that of the flow, as in rate = "10 1/s"'),
+        ({"meeting": '"shear"'}, 'needs rate, the rate of the flow, as in rate = "10 1/s"'),
         ({"scene": 'rate = "1 1/s"'}, "rate: applies only with meeting = 'shear' or 'extension'"),
         ({"meeting": '"brownian"'}, "must be"),
         ({"replicates": 33}, "scene.scrambles = 4 times a power of 2"),

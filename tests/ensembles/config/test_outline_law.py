@@ -57,7 +57,7 @@ def test_so_do_forces_that_ask_how_bodies_are_turned(tmp_path, scene, words):
 @pytest.mark.parametrize(
     ("scene", "more", "words"),
     [
-        ('meeting = "extension"\nrate = 10.0', "", "is for pairs that settle"),
+        ('meeting = "extension"\nrate = 10.0', "", "only settling pairs can have"),
         ('meeting = "brownian"', '[forces.thermal]\ntemperature = "298 K"', "pairs that settle"),
         ("", '[forces.thermal]\ntemperature = "298 K"', "cannot be combined with"),
     ],

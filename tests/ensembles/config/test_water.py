@@ -80,8 +80,7 @@ def test_unlike_potentials_are_for_pairs(tmp_path):
     swarm = '[scene]\nkind = "swarm"\nnumber = 5\nradius = "5 um"\narea_fraction = 0.1\n'
     with pytest.raises(
         ConfigError,
-        match=r"forces\.double_layer\.potential: is given for two "
-        "unlike",
+        match=r"forces\.double_layer\.potential: must be one number in a swarm",
     ):
         loaded(tmp_path, "", layer + "\n" + swarm + "[shapes]\nvertices = [4]")
     with pytest.raises(ConfigError, match=r"double_layer\.potential\[1\] must be an electric"):

@@ -70,7 +70,7 @@ def test_measured_flocs_keep_their_sizes(tmp_path):
     assert len(set(drawn.flocs.tolist())) == 3
     few = study(tmp_path, {"scene": {"max_radius": "6 um"}}, MEASURED)
     assert max(few.drawn(0).flocs) < 2
-    with pytest.raises(ConfigError, match="leave no floc"):
+    with pytest.raises(ConfigError, match="no floc of the library lies"):
         study(tmp_path, {"scene": {"min_radius": "1 mm"}}, MEASURED)
 
 

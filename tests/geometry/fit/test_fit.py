@@ -266,5 +266,5 @@ def test_what_cannot_be_inscribed_is_said():
     with pytest.raises(ShapeError, match="lies inside the floc"):
         fit_mask(np.ones((1, 30), bool), vertices=4, inscribed=True)
     for options in ({"method": "even"}, {"preserve_area": True}):
-        with pytest.raises(UsageError, match="inscribed fit goes with"):
+        with pytest.raises(UsageError, match="inscribed fit needs"):
             fit_mask(blob(0), vertices=4, inscribed=True, **options)
