@@ -21,8 +21,7 @@ FURTHER = ("collided", "inside", *OTHER)
 """Counts that have columns of their own only where all are asked for."""
 
 LEGEND = (
-    "A, B: contact inside the zone, then stick, part; C, D: the same outside. Pr[A]: A and C of A to "
-    "D.",
+    "A, B: contact inside the zone, then stick, part; C, D: the same outside; Pr[A]: A + C of them.",
     "[low, high]: 95 % sampling interval; –: no pair touched; other: no contact, or no outcome.",
 )
 """Lines below a table of probabilities."""
