@@ -211,7 +211,7 @@ def work_of(
     room = min(BLOCKS_A_BODY * n, n * (n - 1)) if blocks is None else blocks
     work: Work = zeros_of(
         Work,
-        n=n, after=n + 1, unknowns=3 * n, few=few, rows=capacity, room=room,
+        n=n, after=n + 1, unknowns=6 * n, few=few, rows=capacity, room=room,
         pieces=len(scene.pieces) + 1, features=len(scene.vertices) + 1,
         **sizes_of_pairs(n, pairs, room),
     )._replace(rules=gauss_rules())  # fmt: skip
@@ -222,7 +222,7 @@ def work_of(
 def sizes_of_pairs(n: int, pairs: int, room: int) -> dict[str, int]:
     """Return the sizes that follow from the room for pairs of bodies, and for sparse blocks."""
     return {
-        "pairs": pairs, "blocks": 2 * n + 2 * pairs, "sparse": n + room,
+        "pairs": pairs, "blocks": 2 * n + 2 * pairs, "sparse": 2 * n + room,
     }  # fmt: skip
 
 

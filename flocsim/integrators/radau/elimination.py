@@ -49,7 +49,12 @@ def slot_of(e, row, column):
 
 def block_of(e, slot):
     """Return the index of the block of an entry of ``column``."""
-    return e.body.shape[0] + slot
+    return 2 * e.body.shape[0] + slot
+
+
+def balance_block(e, body):
+    """Return the index of the block of a body's part of its cluster's momentum balance."""
+    return e.body.shape[0] + body
 
 
 def stiffness_weights(step):
@@ -90,9 +95,10 @@ def write_momentum(scene, work, body, weights, step, both):
     leader, index = e.place[work.cluster[body]], e.place[body]
     # The row of the cluster's first body, and the column of this body.
     to = index if leader == index else block_of(e, slot_of(e, leader, index))
-    # Only drag, walls and the like: forces within the cluster cancel in its momentum balance.
-    write_into(work, to, own_block(work, body), 0, 2, weights, both)
-    add_inertia(scene, work, to, body, 0, 2, step)
+    for block in (to, balance_block(e, body)):
+        # Only drag, walls and the like: forces within the cluster cancel in its momentum balance.
+        write_into(work, block, own_block(work, body), 0, 2, weights, both)
+        add_inertia(scene, work, block, body, 0, 2, step)
 
 
 def write_coupling(work, body, other, block, weights, both):
@@ -111,7 +117,7 @@ def write_systems(scene, work, step, both):
     n = work.poses.shape[0]
     # Clear all blocks, those of fill-in, too.
     for part in range(3 if both else 1):
-        for block in range(n + e.lower[n]):
+        for block in range(block_of(e, e.lower[n])):
             for i in range(3):
                 for j in range(4):
                     e.blocks[part, block, i, j] = 0.0
@@ -375,10 +381,43 @@ def substitute_row(e, loads, index, first, last, both):
             subtract_complex(e, loads, block_of(e, slot), row, other)
 
 
+def keep_balances(work, which):
+    """Copy the loads of the momentum balances behind all others: solutions overwrite them."""
+    loads, n = work.loads, work.poses.shape[0]
+    for row in range(3 * n):
+        # The third number becomes the coefficient of the cluster as a whole.
+        loads[which, 3 * n + row] = 0.0 if row % 3 == 2 else loads[which, row]
+
+
+def restore_momentum(work, which):
+    """Shift each cluster as a whole by what rounding has left of its momentum balance.
+
+    Stiff loads lose digits on their way into the last row, that of the balance. The balance itself
+    has none of them, and the shift changes no contact.
+    """
+    e, loads, n = work.elimination, work.loads, work.poses.shape[0]
+    for body in range(n):
+        if e.place[body] != NONE:
+            block, row = balance_block(e, body), 3 * (n + work.cluster[body])
+            for i in range(2):
+                for j in range(3):
+                    part = number(e.blocks, which, block, i, j)
+                    loads[which, row + i] -= part * loads[which, 3 * body + j]
+                # The mean of both directions is close enough for what is left.
+                loads[which, row + 2] += 0.5 * number(e.blocks, which, block, i, i)
+    for body in range(n):
+        if e.place[body] != NONE:
+            row = 3 * (n + work.cluster[body])
+            for i in range(2):
+                loads[which, 3 * body + i] += loads[which, row + i] / loads[which, row + 2]
+
+
 def solve_blocks(work, both):
     """Replace the load of the real system, or of both, by the solution."""
     e, loads = work.elimination, work.loads
-    n = work.poses.shape[0]
+    n, systems = work.poses.shape[0], 2 if both else 1
+    for which in range(systems):
+        keep_balances(work, which)
     # Forward substitution.
     for index in range(n):
         if e.body[index] != NONE:
@@ -388,5 +427,7 @@ def solve_blocks(work, both):
         body = e.body[index]
         if body != NONE:
             substitute_row(e, loads, index, e.upper[index], e.lower[index + 1], both)
-            for which in range(2 if both else 1):
+            for which in range(systems):
                 divide_load(e, loads, which, index, 3 * body)
+    for which in range(systems):
+        restore_momentum(work, which)
