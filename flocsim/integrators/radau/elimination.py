@@ -381,43 +381,10 @@ def substitute_row(e, loads, index, first, last, both):
             subtract_complex(e, loads, block_of(e, slot), row, other)
 
 
-def keep_balances(work, which):
-    """Copy the loads of the momentum balances behind all others: solutions overwrite them."""
-    loads, n = work.loads, work.poses.shape[0]
-    for row in range(3 * n):
-        # The third number becomes the coefficient of the cluster as a whole.
-        loads[which, 3 * n + row] = 0.0 if row % 3 == 2 else loads[which, row]
-
-
-def restore_momentum(work, which):
-    """Shift each cluster as a whole by what rounding has left of its momentum balance.
-
-    Stiff loads lose digits on their way into the last row, that of the balance. The balance itself
-    has none of them, and the shift changes no contact.
-    """
-    e, loads, n = work.elimination, work.loads, work.poses.shape[0]
-    for body in range(n):
-        if e.place[body] != NONE:
-            block, row = balance_block(e, body), 3 * (n + work.cluster[body])
-            for i in range(2):
-                for j in range(3):
-                    part = number(e.blocks, which, block, i, j)
-                    loads[which, row + i] -= part * loads[which, 3 * body + j]
-                # The mean of both directions is close enough for what is left.
-                loads[which, row + 2] += 0.5 * number(e.blocks, which, block, i, i)
-    for body in range(n):
-        if e.place[body] != NONE:
-            row = 3 * (n + work.cluster[body])
-            for i in range(2):
-                loads[which, 3 * body + i] += loads[which, row + i] / loads[which, row + 2]
-
-
 def solve_blocks(work, both):
     """Replace the load of the real system, or of both, by the solution."""
     e, loads = work.elimination, work.loads
-    n, systems = work.poses.shape[0], 2 if both else 1
-    for which in range(systems):
-        keep_balances(work, which)
+    n = work.poses.shape[0]
     # Forward substitution.
     for index in range(n):
         if e.body[index] != NONE:
@@ -427,7 +394,50 @@ def solve_blocks(work, both):
         body = e.body[index]
         if body != NONE:
             substitute_row(e, loads, index, e.upper[index], e.lower[index + 1], both)
-            for which in range(systems):
+            for which in range(2 if both else 1):
                 divide_load(e, loads, which, index, 3 * body)
-    for which in range(systems):
-        restore_momentum(work, which)
+
+
+def keep_balances(work, both):
+    """Copy the loads of the momentum balances behind all others, as solutions overwrite them."""
+    loads, n = work.loads, work.poses.shape[0]
+    for which in range(2 if both else 1):
+        for row in range(3 * n):
+            # The third number is for the coefficient of the cluster as a whole.
+            loads[which, 3 * n + row] = 0.0 if row % 3 == 2 else loads[which, row]
+
+
+def restore_momentum(work, both):
+    """Shift each cluster as a whole by what rounding has left of its momentum balance."""
+    e, loads, n = work.elimination, work.loads, work.poses.shape[0]
+    for body in range(n):
+        block, row = balance_block(e, body), 3 * (n + work.cluster[body])
+        subtract_real(e, loads, block, row, 3 * body)
+        if both:
+            subtract_complex(e, loads, block, row, 3 * body)
+        for which in range(2 if both else 1):
+            # The mean of both directions will do for a rounding.
+            total = number(e.blocks, which, block, 0, 0) + number(e.blocks, which, block, 1, 1)
+            loads[which, row + 2] += 0.5 * total
+    for body in range(n):
+        leader = work.cluster[body]
+        if e.place[body] != NONE:
+            for which in range(2 if both else 1):
+                row = 3 * (n + leader)
+                for axis in range(2):
+                    # A leader has the lowest index of its cluster.
+                    if leader == body:
+                        loads[which, row + axis] /= loads[which, row + 2]
+                    loads[which, 3 * body + axis] += loads[which, row + axis]
+
+
+def solve_balanced(work, both):
+    """Replace the loads by the solution, and keep the momentum of each cluster to a rounding.
+
+    Stiff loads lose digits on their way into the row of the momentum balance, which is eliminated
+    last. The balance itself has no stiff terms, and a shift of all bodies of a cluster changes none
+    of its contacts.
+    """
+    keep_balances(work, both)
+    solve_blocks(work, both)
+    restore_momentum(work, both)
