@@ -137,7 +137,8 @@ class Work(NamedTuple):
     kick: KickTime
     cluster: Annotated[np.ndarray, ("n",), np.int64]  # first body of those that act on each other
     jacobian: Annotated[np.ndarray, (2, "blocks", 3, 3)]  # 3 × 3 blocks, see rhs.blocks
-    loads: Annotated[np.ndarray, (2, "unknowns"), complex]  # right-hand sides, then solutions
+    # Right-hand sides, then solutions; behind them, what is left of the momentum balances.
+    loads: Annotated[np.ndarray, (2, "unknowns"), complex]
     elimination: Elimination  # linear systems of a step
     candidates: Annotated[np.ndarray, ("rows",), Candidate]
     geometry: Annotated[np.ndarray, (STATES, "rows"), VertexAtEdge]

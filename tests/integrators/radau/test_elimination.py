@@ -101,7 +101,10 @@ def stiff_chain(rng, stiffness):
         if a == b + 1:
             angle = rng.uniform(0.0, 2.0 * np.pi)
             normal, arms = np.array([np.cos(angle), np.sin(angle)]), rng.normal(size=2)
-            of_a, of_b = np.append(normal, arms[0] * radii[a]), np.append(-normal, arms[1] * radii[b])
+            of_a, of_b = (
+                np.append(normal, arms[0] * radii[a]),
+                np.append(-normal, arms[1] * radii[b]),
+            )
             spring = stiffness * masses[a] / STEP**2
             work.jacobian[STIFFNESS, a] += spring * np.outer(of_a, of_a)
             work.jacobian[STIFFNESS, b] += spring * np.outer(of_b, of_b)
