@@ -56,17 +56,26 @@ def table_along(
     row: Callable[[tuple[int, ...]], Sequence[str]],
     places: Iterable[tuple[int, ...]] | None = None, left: int = 0,
 ) -> str:  # fmt: skip
-    """Return a table as text, with a row for every place along some axes, or for these ``places``.
+    """Return `rows_along` as text; ``left`` as in `aligned`."""
+    return "\n".join(aligned(rows_along(axes, heads, row, places), left))
+
+
+def rows_along(
+    axes: Mapping[str, Any], heads: Sequence[str],
+    row: Callable[[tuple[int, ...]], Sequence[str]],
+    places: Iterable[tuple[int, ...]] | None = None,
+) -> list[list[str]]:  # fmt: skip
+    """Return heads, and a row for every place along some axes, or for these ``places``.
 
     ``axes`` {name: values}: the coordinates, with which each row begins; ``row``: the cells that
-    follow at a place, which has an index along each of the axes; ``left`` as in `aligned`.
+    follow at a place, which has an index along each of the axes.
     """
     rows = [[*axes, *heads]]
     every = product(*(range(len(each)) for each in axes.values()))
     for place in every if places is None else places:
         keys = [in_words(values[k]) for values, k in zip(axes.values(), place, strict=True)]
         rows.append([*keys, *row(place)])
-    return "\n".join(aligned(rows, left))
+    return rows
 
 
 def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -16,23 +16,23 @@ from flocsim.ensembles.collision.draw import FAILURES, Draw
 from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.config.sources import Allowed, Sources
-from flocsim.ensembles.contents import Example, stored_in
+from flocsim.ensembles.config.sources import Allowed
+from flocsim.ensembles.contents import Example, stored_config, stored_in
 from flocsim.ensembles.diagnose.spheres import water_facts
 from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.report import checked_line, format_table
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study, says_outcome
-from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
+from flocsim.errors import FlocsimError, UsageError
 from flocsim.fields import is_whole
 from flocsim.integrators.base import Integrator
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.plots.results import FIGURES
-from flocsim.io.plots.style import Figure, add_foot, save
-from flocsim.io.results.file import FORMAT, first_of_each, read_results
+from flocsim.io.plots.style import CLASS_WORDS, Figure, add_foot, save
+from flocsim.io.results.file import FORMAT, instructive_of_each, read_results
 from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.run_group import source_line
-from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS
+from flocsim.io.results.schema import FLAGS, GROUPS
 from flocsim.run import Run
 from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory
@@ -158,18 +158,7 @@ class StudyResults(Tables):
     @functools.cached_property
     def config(self) -> Config:
         """What was run: the config that the file holds, and what was laid over it."""
-        text = str(self.run.get("config", ""))
-        if not text:
-            raise FileError(f"{self.path} has no config: it was not written by flocsim ensemble")
-        sources = Sources(text, allowed=self.allowed)
-        try:
-            return load_config(self.folder / "study.toml", self.stored("overrides"), sources)
-        except ConfigError as error:
-            line, *more = str(error).split("\n")
-            further = f" (and {len(more)} more)" if more else ""
-            raise ConfigError(
-                f"the config in {self.path} cannot be used: {line}{further}"
-            ) from error
+        return stored_config(self.path, self, self.allowed, load_config)
 
     def stored(self, name: str) -> dict:
         """What the group ``run`` has as JSON."""
@@ -267,17 +256,15 @@ class StudyResults(Tables):
 
 
 def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
-    """Return the first replicate of each class that the file has, of its flocs with the most
-    vertices."""
+    """Return a replicate of each class that the file has, chosen by `instructive_of_each`."""
     opened, found = StudyResults(path, allowed), []
-    first = first_of_each(opened.results)
-    for outcome in filter(first.__contains__, CLASSES):
-        t, v, d, k = first[outcome]
+    for outcome, ((t, v, d, k), why) in instructive_of_each(opened.results).items():
         name, vertices, delta = opened.types[t], int(opened.vertices[v]), float(opened.delta[d])
-        title = f"type {name}, N = {vertices}, δ = {delta:g} δ_max, replicate {k}"
+        heading = CLASS_WORDS[outcome]
+        title = f"Type {name}, N = {vertices}, δ = {delta:g} δ_max, replicate {k}. {why}"
         try:
             run: Any = opened.replicate(k, name, vertices, delta)
-            found.append(Example(outcome, title, run, run.row["D_0"]))
+            found.append(Example(heading, title, run, run.row["D_0"]))
         except FlocsimError as error:
-            found.append(Example(outcome, title, reason=" ".join(str(error).split())))
+            found.append(Example(heading, title, reason=" ".join(str(error).split())))
     return found

@@ -7,6 +7,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from flocsim.ensembles import report
 from flocsim.ensembles.config.sources import Allowed
 from flocsim.ensembles.contents import (
@@ -15,6 +17,7 @@ from flocsim.ensembles.contents import (
     Figures,
     Row,
     Summary,
+    Table,
     later,
     study_summary,
 )
@@ -23,6 +26,7 @@ from flocsim.io.results import run_group, schema
 from flocsim.io.results.events import ends_of
 from flocsim.io.results.file import read_results
 from flocsim.io.results.run_group import stored
+from flocsim.io.terminal import rows_along
 
 SAID_APART = (report.MOST_UNDECIDED, "settling", "size_classes", "equivalent_spheres")
 """Facts of the group ``run`` that the summary has in its own words."""
@@ -98,10 +102,31 @@ def swept_table(table: Labelled) -> tuple[Sequence[str], Row]:
     return ("n", *ends, "Pr[A] 95 %"), row
 
 
+PAIR_HEADS = ("n", "Pr[inside]", "Pr[A]", "A", "B", "C", "D", "other")
+PAIR_NOTE = (
+    "In brackets: 95 % intervals of sampling. –: no such collision. Other: missed, held, undecided "
+    "or failed."
+)
+KERNEL_HEADS = ("efficiency α", "β₂ [m²/s]", "β₃ [m³/s]", "β₃ over spheres")
+RATES = ("beta2", "beta3", "efficiency3")
+"""Columns of a kernel below the last three of these heads."""
+KERNEL_NOTE = (
+    "In brackets: 95 % intervals. α: encounters that aggregate of those that touch; β: kernels of "
+    "encounters that aggregate; –: no value."
+)
+
+
+def interval(table: Any, name: str, place: tuple[int, ...]) -> str:
+    """Return "0.345 [0.301, 0.391]": an estimate with its 95 % interval; "–" where it has none."""
+    value, low, high = (table[name + end][place] for end in ("", "_low", "_high"))
+    return "–" if np.isnan(value) else f"{value:.3f} [{low:.3f}, {high:.3f}]"
+
+
 class PairFiles(Contents):
     """What becomes of the rows of a study of pairs or rates; what commands show of its files."""
 
     title = "results of a collision ensemble"
+    first = ("outcomes", "delta", "bonds", "kernels", "efficiency")
     file = schema.RESULTS
     compared = schema.COMPARED
     swept = ("probabilities", "pooled")
@@ -137,6 +162,29 @@ class PairFiles(Contents):
             return "\n".join(report.kernel_lines(results.kernel))
         before = report.efficiency_lines(results)
         return "\n".join([*before, *[""] * bool(before), report.format_table(results)])
+
+    def tables(self, results: schema.Results) -> list[Table]:
+        """Return the rates; or counts and probabilities of every condition."""
+        found, kernel = results.probabilities, results.kernel
+        if kernel is not None:
+            axes: dict[str, Any] = {
+                "mechanism": kernel.mechanisms, "N": kernel.vertices,
+                "class i": kernel.labels, "class j": kernel.labels,
+            }  # fmt: skip
+            shown = kernel.arrays
+            places = [at for at in zip(*np.nonzero(shown["checked"] >= 0.0), strict=True)
+                      if at[2] <= at[3] and shown["width_c"][at] != 0.0]  # fmt: skip
+            heads, *rows = rows_along(axes, KERNEL_HEADS, lambda at: [
+                interval(shown, "alpha", at), *(f"{shown[name][at]:.3g}" for name in RATES)
+            ], places)  # fmt: skip
+            return [Table(heads, rows, KERNEL_NOTE)]
+        others = found["n_total"] - found["n_class"].sum(axis=-1)
+        axes = {"type": results.types, "N": results.vertices, "δ": results.delta}
+        heads, *rows = rows_along(axes, PAIR_HEADS, lambda at: [
+            str(found["n_total"][at]), interval(found, "pr_inside", at),
+            interval(found, "pr_a", at), *map(str, found["n_class"][at]), str(others[at]),
+        ])  # fmt: skip
+        return [Table(heads, rows, PAIR_NOTE)]
 
     def told(self, found: schema.Results) -> str:
         """Return what is printed of a study that has been run."""

@@ -29,7 +29,7 @@ from flocsim.io.results.swarm_file import GONE, POINTS, RINGS, SwarmResults, mea
 MOST_POINTS = 160
 """Points of an outline that is drawn: arcs finer than a picture of many bodies shows are left."""
 
-ALONE, FIXED = "0.78", "0.35"
+ALONE, FIXED = "#c7c7c7", "#595959"
 """Colours of bodies that belong to no cluster of two or more, and of walls."""
 
 BOND_COLOURS = (
@@ -205,14 +205,16 @@ def outlines_of(results: SwarmResults, replicate: int) -> list[list[np.ndarray]]
     return found
 
 
-def cluster_colours(labels: np.ndarray) -> list:
+def cluster_colours(labels: np.ndarray) -> list[str]:
     """A colour for every body: that of its cluster, which follows from its first body."""
     import matplotlib
+    from matplotlib.colors import to_hex
 
-    palette = matplotlib.colormaps["tab20"]
+    tab20 = matplotlib.colormaps["tab20"]
+    palette = [to_hex(tab20(place)) for place in range(20)]
     _, first, place, size = np.unique(labels, True, True, True)
     return [
-        FIXED if label < 0 else (palette(first[own] % 20) if size[own] > 1 else ALONE)
+        FIXED if label < 0 else (palette[first[own] % 20] if size[own] > 1 else ALONE)
         for label, own in zip(labels, place, strict=True)
     ]
 
