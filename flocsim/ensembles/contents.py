@@ -162,6 +162,14 @@ class Contents:
         """Return of which flocs, preset and version it is, in a line."""
         return source_line(found.run)
 
+    def answer(self, found: Any) -> str:
+        """Return what a study found, in one sentence; "" where there is none."""
+        return ""
+
+    def setting(self, found: Any) -> str:
+        """Return of which preset, weight and water it is, in one sentence; "" where unknown."""
+        return ""
+
     def mark(self, found: Any) -> str:
         """Return what each figure has to say, as that it is not complete; "" for nothing."""
         return ""

@@ -140,6 +140,8 @@ class PairFiles(Contents):
     opened = later("ensembles.pairs.opened", "StudyResults")
     compare = later("ensembles.pairs.comparison", "compare")
     examples = later("ensembles.pairs.opened", "examples_of")
+    answer = later("ensembles.pairs.answer", "answer_sentence")
+    setting = later("ensembles.pairs.answer", "setting_sentence")
     verdict = staticmethod(report.verdict)
     read = staticmethod(read_results)
 

@@ -1,0 +1,195 @@
+"""What a study of pairs says in one sentence, and of which flocs and which water it says so."""
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flocsim.body import Fluid, FractalDensity
+from flocsim.ensembles.config.loader import Reading, lay_over, value_at
+from flocsim.ensembles.config.schema import PRESETS, BodiesConfig
+from flocsim.ensembles.config.sources import Sources
+from flocsim.ensembles.config.toml_text import parse
+from flocsim.errors import ConfigError
+from flocsim.io.results.events import AGGREGATED, HOOK
+from flocsim.io.results.run_group import stored
+from flocsim.io.results.schema import Results
+from flocsim.water import ZERO_CELSIUS
+
+SEA_WATER = 30.0
+"""Salinity [g/kg] from which water is called that of the sea, as oceanographers do."""
+
+MOST_HANGING = 0.005
+"""Fraction of the aggregated pairs up to which those that hang are not mentioned."""
+
+PHYSICS = ("bodies", "fluid", "forces", "zone")
+"""Tables whose values a preset gives."""
+
+MOST_CHANGES = 3
+"""Values that differ from the preset which are named."""
+
+
+def answer_sentence(results: Results) -> str:
+    """Return what a study of pairs found, in one sentence; "" for rates.
+
+    Pr[A] and its 95 % interval at the largest N, and of the equivalent spheres, are those of the
+    table `pooled`: every decided collision of a type counts once, at whichever displacement. Of
+    several types the lowest and the highest are given. What is left out of such a probability,
+    pairs that are held apart or have no outcome, is counted behind it.
+
+    >>> answer_sentence(flocsim.open("clay.h5"))  # doctest: +SKIP
+    'Of pairs that touch, 41 % [36, 46] stick (N = 64, real outlines); spheres of the same size: 100 %.'
+    """  # noqa: E501
+    if results.kernel is not None or "pr_a" not in results.pooled:
+        return ""
+    counts = [int(count) for count in results.vertices]
+    most = int(np.argmax(counts))
+    table = {name: values[:, most] for name, values in results.probabilities.items()}
+    noun, which = "pairs", f" (N = {counts[most]}, {outlines_of(results)})"
+    if counts[most] == 1:
+        noun, which = "pairs of spheres", ""
+    if found := range_of(results, most):
+        words = f"Of {noun} that touch, {found} stick{hanging(table)}{which}"
+    elif np.any(table["n_collided"]):
+        words = f"None of the {noun} that touched came to an outcome{which}"
+    else:
+        words = f"No {noun.replace('pairs', 'pair')} touched{which}"
+    spheres = range_of(results, counts.index(1), surely=True) if 1 in counts else ""
+    if found and spheres and counts[most] > 1:
+        words += f"; spheres of the same size: {spheres}"
+    return "".join([words, *left_out(table), "."])
+
+
+def outlines_of(results: Results) -> str:
+    """Return what outlines the flocs of a study have, from how `ShapesConfig.described` says it."""
+    flocs = str(results.run.get("shapes", ""))
+    if " synthetic flocs " in flocs:
+        return "grown outlines"
+    return "real outlines" if " flocs of " in flocs else "outlines of one's own"
+
+
+def range_of(results: Results, vertices: int, surely: bool = False) -> str:
+    """Return "41 % [36, 46]", or the lowest and the highest of several types, at an index of N; ""
+    where there is none. ``surely``: all or none, in all types, stand without an interval."""
+    values, low, high = (results.pooled[f"pr_a{end}"][:, vertices] for end in ("", "_low", "_high"))
+    known = [int(place) for place in np.argsort(values) if not np.isnan(values[place])]
+    if not known:
+        return ""
+    if surely and {values[place] for place in known} in ({0.0}, {1.0}):
+        return f"{percent(values[known[0]])} %"
+
+    def words(place: int, named: bool) -> str:
+        ends = f"[{percent(low[place])}, {percent(high[place])}]"
+        kind = f" (type {results.types[place]})" if named else ""
+        return f"{percent(values[place])} % {ends}{kind}"
+
+    first, last = known[0], known[-1]
+    if values[first] == values[last]:
+        widest = max(known, key=lambda place: high[place] - low[place])
+        return words(widest, False)
+    return f"{words(first, True)} to {words(last, True)}"
+
+
+def percent(value: float) -> str:
+    """Return a fraction in whole percent; nothing but 0 and 1 reads 0 and 100."""
+    if 0.0 < value < 0.005 or 0.995 <= value < 1.0:
+        return f"{min(max(100.0 * value, 0.1), 99.9):.1f}"
+    return f"{100.0 * value:.0f}"
+
+
+def hanging(table: Mapping[str, np.ndarray]) -> str:
+    """Return which fraction of the aggregated pairs hang by their shapes; "" for next to none."""
+    aggregated = table["n_class"][..., list(AGGREGATED)].sum()
+    hooks = table["n_bond"][..., HOOK - 1].sum()
+    if not aggregated or hooks / aggregated < MOST_HANGING:
+        return ""
+    return f", {percent(hooks / aggregated)} % of them by hooking"
+
+
+def left_out(table: Mapping[str, np.ndarray]) -> Iterator[str]:
+    """Yield what became of the pairs that a probability leaves out, but for misses."""
+    total = int(table["n_total"].sum())
+    held, open_ended = (
+        sum(int(table[name].sum()) for name in names)
+        for names in (("n_held",), ("n_undecided", "n_failed"))
+    )
+    if held:
+        yield f"; {held} of {total} pairs are held apart and never touch"
+    if open_ended:
+        yield f"; {open_ended} of {total} pairs have no outcome"
+
+
+def setting_sentence(results: Results) -> str:
+    """Return of which preset, weight and water a study is, from the config that it was run with;
+    "" where the results have none that can be read.
+
+    >>> setting_sentence(flocsim.open("clay.h5"))  # doctest: +SKIP
+    'Preset clay: real weight, sea water of 15 °C and 35 g/kg.'
+    """
+    try:
+        given = lay_over(
+            parse("config", str(results.run["config"])), stored(results.run, "overrides")
+        )
+    except (KeyError, ValueError, ConfigError, RecursionError):
+        return ""
+    name = str(given.get("preset", ""))
+    preset = PRESETS.get(name, {})
+    table, reading = lay_over(preset, given), Reading(Path(), Sources())
+    fluid = reading.made(Fluid, table.get("fluid", {}), "fluid")
+    bodies = reading.made(BodiesConfig, table.get("bodies", {}), "bodies")
+    words = f"Preset {name}{changes_to(preset, given)}" if name else "No preset"
+    if fluid is not None and bodies is not None:
+        words += f": {weight_of(bodies, fluid, results)}, {water_of(fluid)}"
+    return f"{words}."
+
+
+def changes_to(preset: Mapping[str, Any], given: Mapping[str, Any]) -> str:
+    """Return which values of a preset a config replaces, or what it adds to them."""
+    found = [
+        f"{key} = {value}" for key, value in leaves({k: given.get(k, {}) for k in PHYSICS})
+        if value_at(preset, key) != value
+    ]  # fmt: skip
+    more = len(found) - MOST_CHANGES
+    shown = ", ".join([*found[:MOST_CHANGES], *([f"{more} more"] if more > 0 else [])])
+    return f" with {shown}" if found else ""
+
+
+def leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield (dotted key, value) of nested dicts."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from leaves(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", value
+
+
+def weight_of(bodies: BodiesConfig, fluid: Fluid, results: Results) -> str:
+    """Return what the flocs weigh, in words."""
+    sunk = "" if fluid.buoyancy else ", no buoyancy"
+    if isinstance(bodies.density, FractalDensity):
+        return f"real weight{sunk}"
+    if bodies.density is not None:
+        return f"{bodies.density:g} kg/m³{sunk}"
+    words = f"{bodies.surface_density:g} kg/m² of projected area"
+    radii = np.concatenate([np.ravel(each) for each in results.radii.values()])
+    radii = radii[radii > 0.0]  # NaN where they are not known
+    if len(radii):
+        # Spread over the mean depth of a sphere, a mass per area is a density.
+        times = bodies.surface_density / (4.0 / 3.0 * radii) / fluid.density
+        ends = dict.fromkeys(f"{float(f'{end:.2g}'):g}" for end in (times.min(), times.max()))
+        words += f", {' to '.join(ends)} times as dense as water"
+    return f"{words}{sunk}"
+
+
+def water_of(fluid: Fluid) -> str:
+    """Return the water, in words."""
+    warmth = f"{fluid.warmth - ZERO_CELSIUS:.3g} °C"
+    if fluid.salinity:
+        kind = "sea" if fluid.salinity >= SEA_WATER else "brackish"
+        return f"{kind} water of {warmth} and {fluid.salinity:g} g/kg"
+    if fluid.ionic_strength:
+        return f"water of {warmth} and {fluid.ionic_strength:g} mmol/l of salt"
+    if fluid.temperature is not None or fluid.salinity is not None:
+        return f"fresh water of {warmth}"
+    return f"water of {1e3 * fluid.viscosity:.3g} mPa s"
