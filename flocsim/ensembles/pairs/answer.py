@@ -1,6 +1,6 @@
 """What a study of pairs says in one sentence, and of which flocs and which water it says so."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
