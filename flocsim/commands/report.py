@@ -474,7 +474,8 @@ def crowd_of(crowd: Crowd, mark: str) -> tuple[dict, str]:
                      for x, y in shifts if x or y)  # fmt: skip
     return data, (
         f"<svg class='crowd' role='img' aria-label='the swarm' viewBox='0 {-height:.6g} "
-        f"{width:.6g} {height:.6g}'><g transform='scale(1,-1)'><g id='crowd{mark}'>{bodies}</g>{copies}</g>"
+        f"{width:.6g} {height:.6g}'>"
+        f"<g transform='scale(1,-1)'><g id='crowd{mark}'>{bodies}</g>{copies}</g>"
         f"{scale_bar(0.03 * width, -0.03 * height, 0.5 * width)}</svg>"
     )
 
@@ -519,6 +520,7 @@ def graph_of(run: Any, frames: Frames, zone: float, factor: float) -> tuple[str,
     dots = scale * figure.axes[0].transData.transform(points) * [1.0, -1.0] + [0.0, height]
     return (
         f"<svg class='graph' role='img' aria-label='centre distance against time' "
-        f"viewBox='0 0 {width:.6g} {height:.6g}'><image href='{data}' width='{width:.6g}' height='{height:.6g}'/>"
+        f"viewBox='0 0 {width:.6g} {height:.6g}'>"
+        f"<image href='{data}' width='{width:.6g}' height='{height:.6g}'/>"
         f"<circle class='now' r='3' fill='{BODY_COLOURS[0]}'/></svg>"
     ), dots

@@ -146,10 +146,6 @@ class Contents:
         """Return its numbers as text."""
         return ""
 
-    def answer(self, found: Any) -> str:
-        """Return what it found in one sentence; "" for none."""
-        return ""
-
     def tables(self, found: Any) -> list[Table]:
         """Return its numbers for a page; none: the text of `table` is shown."""
         return []
