@@ -68,11 +68,6 @@ BETWEEN = 12
 
 MOST_THUMBNAILS = 12
 
-FRAME_WORDS = (
-    "Run again from the seed, and seen from the receiving floc. Frames are spaced by distance, not "
-    "by time. Red rings mark contacts."
-)
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Write one HTML page on a file, or on several, that needs no other file: what they found in a
@@ -143,14 +138,10 @@ def report_page(parts: Sequence[Part]) -> str:
         mark = f"{number + 1}-" if len(parts) > 1 else ""
         sections = {
             "Figures": figures_of(part, words),
-            "Motion": "\n".join(motion_of(each, f"{mark}{k}", words)
-                                for k, each in enumerate(part.examples)),
+            "Motion": motions_of(part, mark, words),
             "Table": tables_of(part, words),
             "How it was made": made_of(part, words),
-        }  # fmt: skip
-        sections["Motion"] = (
-            sections["Motion"] and f"<div class='motions'>{sections['Motion']}</div>"
-        )
+        }
         name = f"{Path(part.path).name}: " if mark else ""
         for head, content in sections.items():
             if content:
@@ -226,19 +217,22 @@ def folded(summary: str, content: str) -> str:
 
 
 def answer_of(part: Part, words: Words) -> str:
-    """Return what a file found in a large sentence, of which flocs, and its warnings."""
-    title = part.kind.title
-    answer = part.kind.answer(part.found) or f"{title[0].upper()}{title[1:]}"
-    warnings = "".join(f"<li>{text(each)}</li>" for each in part.kind.summary(part.found).warnings)
-    mark = part.kind.mark(part.found)
-    of = " · ".join(
-        filter(None, [mark, part.kind.setting(part.found), part.kind.source(part.found)])
-    )
-    return (
-        f"<p class='file'>{text(f'{part.path}: {title}')}</p>\n<h1>{words.linked(answer)}</h1>\n"
-        f"<p class='source'>{words.linked(of)}</p>\n"
-        + (f"<ul class='warnings'>{warnings}</ul>" if warnings else "")
-    )
+    """Return what a file found in a large sentence, of which flocs and water, and its warnings."""
+    kind, found = part.kind, part.found
+    answer = kind.answer(found) or f"{kind.title[0].upper()}{kind.title[1:]}"
+    # What belongs together stays in one line.
+    answer = answer.replace(" %", "\u00a0%").replace(" = ", "\u00a0=\u00a0")
+    lines = {
+        "file": text(f"{part.path}: {kind.title}"),
+        "answer": words.linked(answer),
+        "setting": words.linked(kind.setting(found)),
+        "source": text(" · ".join(filter(None, [kind.mark(found), kind.source(found)]))),
+        "warning": "<br>".join(map(text, kind.summary(found).warnings)),
+    }
+    return "\n".join(
+        f"<{tag} class='{name}'>{line}</{tag}>" for name, line in lines.items()
+        for tag in ["h1" if name == "answer" else "p"] if line
+    )  # fmt: skip
 
 
 def figures_of(part: Part, words: Words) -> str:
@@ -360,15 +354,21 @@ def figure_of(name: str, draw: Any, results: Any, foot: str, words: Words) -> st
     with house_style():
         figure = draw(results)
         add_foot(figure, foot)
-    title = f"Figure {name}" if name.isdigit() else name.capitalize()
-    caption = f"{title}: {(draw.__doc__ or '').partition(chr(10))[0]}"
+    caption = f"Figure {name}: " * name.isdigit() + (draw.__doc__ or "").partition("\n")[0]
     picture, wide = data_of(figure), 96.0 * figure.bbox.width / figure.dpi
-    size = f"width:{1.2 * wide:.0f}px;max-width:100%;min-width:{0.8 * wide:.0f}px"
+    size = f"width:{1.3 * wide:.0f}px;max-width:100%;min-width:{0.8 * wide:.0f}px"
     return (
         f"<figure><div class='scroll'><div class='paper'><img alt='{text(caption)}' "
         f"style='{size}' src='{picture}'></div></div>"
         f"<figcaption>{words.linked(caption)}</figcaption></figure>"
     )
+
+
+def motions_of(part: Part, mark: str, words: Words) -> str:
+    """Return all examples of a file and how they were chosen."""
+    shown = "\n".join(motion_of(each, f"{mark}{k}", words) for k, each in enumerate(part.examples))
+    chosen = words.linked(part.kind.on_examples)
+    return shown and f"<p>{chosen}</p>\n<div class='motions'>{shown}</div>"
 
 
 def motion_of(example: Example, mark: str, words: Words) -> str:
@@ -379,7 +379,6 @@ def motion_of(example: Example, mark: str, words: Words) -> str:
         data, panels = crowd_of(example.crowd, mark)
     elif example.trajectory is not None:
         data, panels = collision_of(example.trajectory, example.zone_distance)
-        heading += f" {words.linked(FRAME_WORDS)}"
     else:
         return (
             f"<figure class='motion'><figcaption>{heading}<br>Not shown in motion: "

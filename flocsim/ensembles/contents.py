@@ -118,6 +118,8 @@ class Contents:
     file: FileFormat
     first: Sequence[str] = ()
     """Figures that a page shows first."""
+    on_examples: str = ""
+    """What a page says of the motions that `examples` gives."""
     compared: Mapping[str, str] = {}
     """{name: words} of what can be compared."""
     swept: Sequence[str] = ()

@@ -291,7 +291,7 @@ class SweepFiles(Contents):
         words = []
         for extreme in (np.nanargmin, np.nanargmax):
             place = np.unravel_index(extreme(values), values.shape)
-            at = [f"{axis} = {in_words(table.axes[axis].values[k].item())}"
+            at = [f"{axis} = {in_words(table.axes[axis].values.tolist()[k])}"
                   for axis, k in zip(axes, place, strict=True)]  # fmt: skip
             words.append(f"{values[place]:.3g} at {', '.join(at)}")
         return f"{ANSWERS[name]} is least, {words[0]}, and largest, {words[1]}."

@@ -261,7 +261,7 @@ def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
     for outcome, ((t, v, d, k), why) in instructive_of_each(opened.results).items():
         name, vertices, delta = opened.types[t], int(opened.vertices[v]), float(opened.delta[d])
         heading = CLASS_WORDS[outcome]
-        title = f"Type {name}, N = {vertices}, δ = {delta:g} δ_max, replicate {k}. {why}"
+        title = f"Type {name}, N = {vertices}, δ = {delta:g}, replicate {k}: {why}."
         try:
             run: Any = opened.replicate(k, name, vertices, delta)
             found.append(Example(heading, title, run, run.row["D_0"]))

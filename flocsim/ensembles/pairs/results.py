@@ -102,6 +102,12 @@ def swept_table(table: Labelled) -> tuple[Sequence[str], Row]:
     return ("n", *ends, "Pr[A] 95 %"), row
 
 
+ON_EXAMPLES = (
+    "One pair of each class, run again from the seed and seen from the receiving floc: of those "
+    "with the most vertices the one whose time from touch to decision is nearest to the upper "
+    "quartile, long enough to see what happens in contact and no exception. Frames are spaced by "
+    "distance, not by time. Red rings mark contacts."
+)
 PAIR_HEADS = ("n", "Pr[inside]", "Pr[A]", "A", "B", "C", "D", "other")
 PAIR_NOTE = (
     "In brackets: 95 % intervals of sampling. –: no such collision. Other: missed, held, undecided "
@@ -126,6 +132,7 @@ class PairFiles(Contents):
     """What becomes of the rows of a study of pairs or rates; what commands show of its files."""
 
     title = "results of a collision ensemble"
+    on_examples = ON_EXAMPLES
     first = ("outcomes", "delta", "bonds", "kernels", "efficiency")
     file = schema.RESULTS
     compared = schema.COMPARED

@@ -41,9 +41,10 @@ from flocsim.io.terminal import in_words
 MOST_SHOWN = 120
 """Snapshots of a motion on a page."""
 
-CROWD_WORDS = (
-    "Each cluster of two or more flocs has a colour; single flocs are grey. Between snapshots, "
-    "positions are interpolated. Where the box repeats itself, the view moves with the mean motion."
+ON_EXAMPLES = (
+    "The first swarm. Each cluster of two or more flocs has a colour; single flocs are grey. "
+    "Between snapshots, positions are interpolated. Along the sides on which the box repeats "
+    "itself, the view moves with the flocs."
 )
 
 # What is saved of a replicate while it runs.
@@ -233,6 +234,7 @@ class SwarmFiles(Contents):
     file = swarm_file.SWARMS
     table = staticmethod(swarm_file.table_of)
     compared = {name: words for name, (_, _, words) in swarm_file.COUNTS.items()}  # noqa: RUF012
+    on_examples = ON_EXAMPLES
     first = ("snapshots", "clusters", "sizes")
     swept = ("counts",)
     swept_table = staticmethod(swept_table)
@@ -327,7 +329,7 @@ class SwarmFiles(Contents):
             tuple(bodies["box"][0]), str(found.run.get("periodic", "xy")),
             bodies["floc"][0] == swarm_file.WALL,
         )  # fmt: skip
-        return [Example("The first swarm", CROWD_WORDS, crowd=crowd)]
+        return [Example("", "", crowd=crowd)]
 
     def running(self, found: Any) -> Facts:
         """Return facts of swarms that still run."""

@@ -142,10 +142,7 @@ def instructive_of_each(results: Results) -> dict[str, tuple[tuple[int, int, int
         wanted = np.quantile(times[of_class], 0.75)
         distances = np.where(of_class, np.abs(times - wanted), np.inf)
         t, v, d, row = map(int, np.unravel_index(distances.argmin(), distances.shape))
-        many = f"{np.count_nonzero(of_class)} in class {name} at N = {most}"
-        why = (
-            f"Chosen from {many}: its time from touch to decision, {times[t, v, d, row]:.2g} s, "
-            "is nearest to the upper quartile."
-        )
+        time, many = 1e3 * times[t, v, d, row], np.count_nonzero(of_class)
+        why = f"{time:.2g} ms from touch to decision, chosen from {many} pairs"
         found[name] = (t, v, d, row), why
     return found
