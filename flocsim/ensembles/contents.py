@@ -11,20 +11,19 @@ import importlib
 import os
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 
 from flocsim.ensembles.config import FILES, STUDIES, contents_of
-from flocsim.ensembles.config.sources import Allowed, Sources
-from flocsim.errors import ConfigError, FileError, UsageError, visible
+from flocsim.ensembles.config.sources import Allowed
+from flocsim.errors import FileError, UsageError, visible
 from flocsim.io.groups import UNREADABLE, FileFormat
 from flocsim.io.hdf5 import Unfit, open_hdf5
 from flocsim.io.labelled import Column, Labelled, Tables, with_unit
 from flocsim.io.results.run_group import source_line, stored
-from flocsim.io.terminal import table_along
+from flocsim.io.terminal import aligned, table_along
 
 Facts = list[tuple[str, str]]
 """[(name, value)]."""
@@ -53,48 +52,14 @@ class Summary:
 
 
 @attrs.frozen
-class Table:
-    """A table for a page: cells as text, a row for each condition; ``note`` explains it in a
-    line."""
-
-    heads: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    note: str = ""
-
-
-@attrs.frozen(eq=False)
-class Crowd:
-    """The bodies of a swarm at some times (k,) [s].
-
-    ``position`` (k, n, 3) [m, m, rad] is NaN where a body has left; ``outlines``: rings [m] of each
-    body about its centroid; ``colours`` (k, n); ``words`` (k,) say what is seen; ``box`` width and
-    height [m], which repeats itself along the axes of ``periodic``; ``walls`` (n,) do not repeat.
-    """
-
-    times: np.ndarray
-    position: np.ndarray
-    outlines: Sequence[Sequence[np.ndarray]]
-    colours: Sequence[Sequence[str]]
-    words: Sequence[str]
-    box: tuple[float, float]
-    periodic: str
-    walls: np.ndarray
-
-
-@attrs.frozen(eq=False)
 class Example:
-    """A motion to watch: ``heading`` names it and ``title`` says which and why.
-
-    The ``trajectory`` of a pair with its zone_distance D_0 [m], or a ``crowd``; neither where it
-    could not be run again, which ``reason`` says.
-    """
+    """A motion to watch: ``heading`` names it, ``title`` says which; ``data`` is for the script of
+    a page, and None where it could not be run again, which ``reason`` says."""
 
     heading: str
     title: str
-    trajectory: Any = None
-    zone_distance: float = float("nan")
+    data: Mapping[str, Any] | None = None
     reason: str = ""
-    crowd: Crowd | None = None
 
 
 def later(module: str, name: str) -> Any:
@@ -144,16 +109,16 @@ class Contents:
         """Return what a file says of itself; ValueError where that cannot be read."""
         raise NotImplementedError
 
-    def table(self, found: Any) -> str:
-        """Return its numbers as text."""
-        return ""
-
-    def tables(self, found: Any) -> list[Table]:
-        """Return its numbers for a page; none: the text of `table` is shown."""
+    def rows(self, found: Any) -> list[list[str]]:
+        """Return its numbers as cells of a table, heads first; [] where there is only `table`."""
         return []
 
+    def table(self, found: Any) -> str:
+        """Return its numbers as text."""
+        return "\n".join(aligned(self.rows(found)))
+
     def figures(self, found: Any) -> Figures:
-        """Return the figures that a file has, those in ``first`` being its most telling."""
+        """Return the figures that a file has."""
         return {}
 
     def source(self, found: Any) -> str:
@@ -179,6 +144,10 @@ class Contents:
     def examples(self, path: Any, allowed: Allowed) -> list[Example]:
         """Return motions that are worth watching."""
         return []
+
+    def outlines(self, path: Any, allowed: Allowed) -> dict[str, Any]:
+        """Return {name of a floc: its Shape}, of those that a study draws from."""
+        return {}
 
     # What rank 0 asks of a kind of study.
 
@@ -419,26 +388,6 @@ def stored_in(results: Any, name: str = "identity") -> dict[str, Any]:
     except ValueError as error:
         where = getattr(results, "path", "a file")
         raise FileError(f"{where} has no readable results: {error}") from error
-
-
-def stored_config(
-    path: str | os.PathLike, results: Any, allowed: Allowed, load: Callable[..., Any]
-) -> Any:
-    """Return the Config that results hold, with what was laid over it, read by ``load``.
-
-    FileError where they have none; ConfigError where it cannot be used, as one with a class of
-    one's own whose module is not ``allowed``.
-    """
-    text = str(results.run.get("config", ""))
-    if not text:
-        raise FileError(f"{path} has no config: it was not written by flocsim ensemble")
-    folder, sources = allowed.folder or Path(path).parent, Sources(text, allowed=allowed)
-    try:
-        return load(folder / "study.toml", stored_in(results, "overrides"), sources)
-    except ConfigError as error:
-        line, *more = str(error).split("\n")
-        further = f" (and {len(more)} more)" if more else ""
-        raise ConfigError(f"the config in {path} cannot be used: {line}{further}") from error
 
 
 def changes_between(first: Any, second: Any) -> tuple[str, ...]:

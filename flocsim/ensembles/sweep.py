@@ -20,7 +20,6 @@ from flocsim.ensembles.contents import (
     Contents,
     Figures,
     Summary,
-    Table,
     open_any,
     stored_in,
     studies,
@@ -38,7 +37,7 @@ from flocsim.io.results.run_group import SOURCE
 from flocsim.io.results.schema import AXES
 from flocsim.io.results.sweep_file import SweepResults, Swept, read_sweep, write_sweep
 from flocsim.io.seals import held
-from flocsim.io.terminal import in_words, rows_along, table_along
+from flocsim.io.terminal import in_words, rows_along
 
 Facts = dict[str, Any]
 
@@ -246,10 +245,6 @@ def read_joined(path: str | os.PathLike) -> SweepResults:
     return read_sweep(path, [(each.file, each.swept) for each in kinds_joined()])
 
 
-ANSWERS = {"pr_a": "Pr[A]", "mean_size": "The mean cluster size at the end"}
-"""Columns of which the answer of a sweep speaks, by what comes first, with their words."""
-
-
 class SweepFiles(Contents):
     """What commands show of the joined file of a sweep."""
 
@@ -263,43 +258,20 @@ class SweepFiles(Contents):
             for name, each in found.swept.items()
         ])  # fmt: skip
 
-    def table(self, found: SweepResults) -> str:
-        """Return numbers at every value as text."""
-        return table_along(*self.parts_of_table(found))
+    def answer(self, found: SweepResults) -> str:
+        """Return what was swept."""
+        keys = " and ".join(each.key for each in found.swept.values())
+        return f"How outcomes depend on {keys}."
 
-    def parts_of_table(self, found: SweepResults) -> tuple:
-        """Return the arguments of `rows_along`."""
+    def rows(self, found: SweepResults) -> list[list[str]]:
+        """Return numbers at every value."""
         kind = next(each for each in kinds_joined() if {*each.swept} == found.groups.keys())
         table = found.labelled(kind.swept[0])
         axes = {
             name: table.axes[name].values for name in table.shared_axes
             if name not in ("replicate", "time")
         }  # fmt: skip
-        return axes, *kind.swept_table(table)
-
-    def answer(self, found: SweepResults) -> str:
-        """Return where Pr[A], or the mean size of clusters at the end, is least and largest."""
-        table = next(iter(found.groups.values()))
-        name = next(filter(table.columns.__contains__, ANSWERS), None)
-        if name is None:
-            return ""
-        axes, values = table.columns[name].axes, table.columns[name].values
-        if "time" in axes:
-            axes, values = axes[:-2], values[..., -1].mean(axis=-1)
-        if not np.isfinite(values).any():
-            return ""
-        words = []
-        for extreme in (np.nanargmin, np.nanargmax):
-            place = np.unravel_index(extreme(values), values.shape)
-            at = [f"{axis} = {in_words(table.axes[axis].values.tolist()[k])}"
-                  for axis, k in zip(axes, place, strict=True)]  # fmt: skip
-            words.append(f"{values[place]:.3g} at {', '.join(at)}")
-        return f"{ANSWERS[name]} is least, {words[0]}, and largest, {words[1]}."
-
-    def tables(self, found: SweepResults) -> list[Table]:
-        """Return numbers at every value."""
-        heads, *rows = rows_along(*self.parts_of_table(found))
-        return [Table(heads, rows)]
+        return rows_along(axes, *kind.swept_table(table))
 
     def figures(self, found: SweepResults) -> Figures:
         """Return figures along a swept key."""

@@ -16,15 +16,16 @@ from flocsim.ensembles.collision.draw import FAILURES, Draw
 from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.config.sources import Allowed
-from flocsim.ensembles.contents import Example, stored_config, stored_in
+from flocsim.ensembles.config.sources import Allowed, Sources
+from flocsim.ensembles.contents import Example, stored_in
 from flocsim.ensembles.diagnose.spheres import water_facts
-from flocsim.ensembles.kind import study_of
+from flocsim.ensembles.kind import flocs_of, study_of
 from flocsim.ensembles.report import checked_line, format_table
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study, says_outcome
-from flocsim.errors import FlocsimError, UsageError
+from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.fields import is_whole
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.plots.results import FIGURES
@@ -34,6 +35,7 @@ from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.run_group import source_line
 from flocsim.io.results.schema import FLAGS, GROUPS
 from flocsim.run import Run
+from flocsim.trajectories.figures import motion_data
 from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory
 
@@ -158,7 +160,18 @@ class StudyResults(Tables):
     @functools.cached_property
     def config(self) -> Config:
         """What was run: the config that the file holds, and what was laid over it."""
-        return stored_config(self.path, self, self.allowed, load_config)
+        text = str(self.run.get("config", ""))
+        if not text:
+            raise FileError(f"{self.path} has no config: it was not written by flocsim ensemble")
+        sources = Sources(text, allowed=self.allowed)
+        try:
+            return load_config(self.folder / "study.toml", self.stored("overrides"), sources)
+        except ConfigError as error:
+            line, *more = str(error).split("\n")
+            further = f" (and {len(more)} more)" if more else ""
+            raise ConfigError(
+                f"the config in {self.path} cannot be used: {line}{further}"
+            ) from error
 
     def stored(self, name: str) -> dict:
         """What the group ``run`` has as JSON."""
@@ -261,10 +274,21 @@ def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
     for outcome, ((t, v, d, k), why) in instructive_of_each(opened.results).items():
         name, vertices, delta = opened.types[t], int(opened.vertices[v]), float(opened.delta[d])
         heading = CLASS_WORDS[outcome]
-        title = f"Type {name}, N = {vertices}, δ = {delta:g}, replicate {k}: {why}."
+        at = "" if opened.kernel else f"δ = {delta:g}, "
+        title = f"Type {name}, N = {vertices}, {at}replicate {k}: {why}."
         try:
-            run: Any = opened.replicate(k, name, vertices, delta)
-            found.append(Example(heading, title, run, run.row["D_0"]))
+            run = opened.replicate(k, name, vertices, delta)
+            found.append(Example(heading, title, motion_data(run)))
         except FlocsimError as error:
             found.append(Example(heading, title, reason=" ".join(str(error).split())))
     return found
+
+
+def outlines_of(path: str | os.PathLike, allowed: Allowed) -> dict[str, Shape]:
+    """Return the flocs that the study of a file draws from, by name; none where its config cannot
+    be used here."""
+    try:
+        flocs = flocs_of(StudyResults(path, allowed).config)
+    except FlocsimError:
+        return {}
+    return {floc.name: floc.shapes[max(floc.shapes)] for floc in flocs}

@@ -17,7 +17,6 @@ from flocsim.ensembles.contents import (
     Figures,
     Row,
     Summary,
-    Table,
     later,
     study_summary,
 )
@@ -108,18 +107,8 @@ ON_EXAMPLES = (
     "quartile, long enough to see what happens in contact and no exception. Frames are spaced by "
     "distance, not by time. Red rings mark contacts."
 )
-PAIR_HEADS = ("n", "Pr[inside]", "Pr[A]", "A", "B", "C", "D", "other")
-PAIR_NOTE = (
-    "In brackets: 95 % intervals of sampling. –: no such collision. Other: missed, held, undecided "
-    "or failed."
-)
-KERNEL_HEADS = ("efficiency α", "β₂ [m²/s]", "β₃ [m³/s]", "β₃ over spheres")
-RATES = ("beta2", "beta3", "efficiency3")
-"""Columns of a kernel below the last three of these heads."""
-KERNEL_NOTE = (
-    "In brackets: 95 % intervals. α: encounters that aggregate of those that touch; β: kernels of "
-    "encounters that aggregate; –: no value."
-)
+HEADS = ("n", "Pr[inside]", "Pr[A]", *schema.CLASSES, "other")
+"""Of the table of a page, behind the condition."""
 
 
 def interval(table: Any, name: str, place: tuple[int, ...]) -> str:
@@ -147,7 +136,8 @@ class PairFiles(Contents):
     opened = later("ensembles.pairs.opened", "StudyResults")
     compare = later("ensembles.pairs.comparison", "compare")
     examples = later("ensembles.pairs.opened", "examples_of")
-    answer = later("ensembles.pairs.answer", "answer_sentence")
+    outlines = later("ensembles.pairs.opened", "outlines_of")
+    pairs_answer = later("ensembles.pairs.answer", "answer_sentence")
     setting = later("ensembles.pairs.answer", "setting_sentence")
     verdict = staticmethod(report.verdict)
     read = staticmethod(read_results)
@@ -172,28 +162,32 @@ class PairFiles(Contents):
         before = report.efficiency_lines(results)
         return "\n".join([*before, *[""] * bool(before), report.format_table(results)])
 
-    def tables(self, results: schema.Results) -> list[Table]:
-        """Return the rates; or counts and probabilities of every condition."""
-        found, kernel = results.probabilities, results.kernel
-        if kernel is not None:
-            axes: dict[str, Any] = {
-                "mechanism": kernel.mechanisms, "N": kernel.vertices,
-                "class i": kernel.labels, "class j": kernel.labels,
-            }  # fmt: skip
-            shown = kernel.arrays
-            places = [at for at in zip(*np.nonzero(shown["checked"] >= 0.0), strict=True)
-                      if at[2] <= at[3] and shown["width_c"][at] != 0.0]  # fmt: skip
-            heads, *rows = rows_along(axes, KERNEL_HEADS, lambda at: [
-                interval(shown, "alpha", at), *(f"{shown[name][at]:.3g}" for name in RATES)
-            ], places)  # fmt: skip
-            return [Table(heads, rows, KERNEL_NOTE)]
+    def answer(self, found: schema.Results) -> str:
+        """Return what a study of pairs, or of rates, found in one sentence."""
+        kernel = found.kernel
+        if kernel is None:
+            return self.pairs_answer(found)
+        most, words = kernel.vertices.argmax(), []
+        for mechanism, alpha in zip(
+            kernel.mechanisms, kernel.arrays["alpha"][:, most], strict=True
+        ):
+            known = alpha[np.isfinite(alpha)]
+            if known.size:
+                words.append(f"{100 * known.min():.0f} to {100 * known.max():.0f} % by {mechanism}")
+        shares = ", ".join(words) or "an unknown fraction"
+        return f"Of pairs that touch, by size, {shares} stick (N = {kernel.vertices[most]})."
+
+    def rows(self, results: schema.Results) -> list[list[str]]:
+        """Return counts and probabilities of every condition; of rates there is the text."""
+        if results.kernel is not None:
+            return []
+        found = results.probabilities
         others = found["n_total"] - found["n_class"].sum(axis=-1)
         axes = {"type": results.types, "N": results.vertices, "δ": results.delta}
-        heads, *rows = rows_along(axes, PAIR_HEADS, lambda at: [
+        return rows_along(axes, HEADS, lambda at: [
             str(found["n_total"][at]), interval(found, "pr_inside", at),
             interval(found, "pr_a", at), *map(str, found["n_class"][at]), str(others[at]),
         ])  # fmt: skip
-        return [Table(heads, rows, PAIR_NOTE)]
 
     def told(self, found: schema.Results) -> str:
         """Return what is printed of a study that has been run."""

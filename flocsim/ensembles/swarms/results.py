@@ -16,14 +16,12 @@ import numpy as np
 from flocsim.ensembles.contents import (
     MEANINGS,
     Contents,
-    Crowd,
     Differences,
     Example,
     Facts,
     Figures,
     Row,
     Summary,
-    Table,
     changes_between,
     common,
     later,
@@ -37,9 +35,6 @@ from flocsim.io.results import swarm_file
 from flocsim.io.results.run_group import stored
 from flocsim.io.results.swarm_file import SwarmResults
 from flocsim.io.terminal import in_words
-
-MOST_SHOWN = 120
-"""Snapshots of a motion on a page."""
 
 ON_EXAMPLES = (
     "The first swarm. Each cluster of two or more flocs has a colour; single flocs are grey. "
@@ -232,6 +227,7 @@ class SwarmFiles(Contents):
 
     title = "results of a swarm study"
     file = swarm_file.SWARMS
+    rows = staticmethod(swarm_file.rows_of)
     table = staticmethod(swarm_file.table_of)
     compared = {name: words for name, (_, _, words) in swarm_file.COUNTS.items()}  # noqa: RUF012
     on_examples = ON_EXAMPLES
@@ -304,32 +300,14 @@ class SwarmFiles(Contents):
         form, over = ("forms", "") if many == 1 else ("form", f", means over {many} swarms")
         return (
             f"After {found.scales['time'][-1]:g} s, a swarm of {bodies} flocs {form} "
-            f"{clusters:.3g} clusters; the mean floc is in a cluster of {size:.3g}{over}."
+            f"{clusters:.3g} clusters; a floc is, on average, in a cluster of {size:.2g}{over}."
         )
-
-    def tables(self, found: SwarmResults) -> list[Table]:
-        """Return numbers on the clusters over time."""
-        heads, *rows = swarm_file.rows_of(found)
-        return [Table(heads, rows, "Means over all swarms.")]
 
     def examples(self, path: Any, allowed: Any) -> list[Example]:
         """Return the motion of the first swarm, by its snapshots."""
-        from flocsim.io.plots.swarm import cluster_colours, outlines_of, places_shown
+        from flocsim.io.plots.swarm import motion_data
 
-        found = self.read(path)
-        chosen, bodies = places_shown(found, MOST_SHOWN), found.groups["bodies"]
-        moments, counts = found.groups["snapshots"], found.groups["counts"]
-        times = found.scales["time"][chosen]
-        numbers = zip(times, *(counts[name][0, chosen] for name in ("clusters", "largest")),
-                      strict=True)  # fmt: skip
-        crowd = Crowd(
-            times, moments["position"][0, chosen], outlines_of(found, 0),
-            [cluster_colours(each) for each in moments["cluster"][0, chosen]],
-            [f"t = {t:.3g} s: {n:.0f} clusters, largest {most:.0f}" for t, n, most in numbers],
-            tuple(bodies["box"][0]), str(found.run.get("periodic", "xy")),
-            bodies["floc"][0] == swarm_file.WALL,
-        )  # fmt: skip
-        return [Example("", "", crowd=crowd)]
+        return [Example("", "", motion_data(self.read(path)))]
 
     def running(self, found: Any) -> Facts:
         """Return facts of swarms that still run."""

@@ -243,7 +243,7 @@ def rows_of(found: SwarmResults) -> list[list[str]]:
         "percolating": (mean(counts["percolating"]), "{:.1f}"),
         "R_g [um]": (1e6 * mean(counts["gyration"]), "{:.3g}"),
         "porosity": (mean(counts["porosity"]), "{:.3f}"),
-        "held": (mean(counts["bonds_certificate"]), "{:.1f}"),
+        "certificates": (mean(counts["bonds_certificate"]), "{:.1f}"),
         "hooks": (mean(counts["bonds_hook"]), "{:.1f}"),
         "settling [mm/s]": (1e3 * mean(counts["settling"]), "{:.4g}"),
         "median position error [m]": (mean(counts["median_error"]), "{:.1e}"),
