@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     parts = [part_of(each, allowed_by(args), not args.no_motion) for each in args.results]
     write_file(path, report_page(parts).encode(), args.overwrite)
     for example in (each for part in parts for each in part.motions if each.reason):
-        print(f"class {example.heading} not animated: {example.reason}")
+        print(f"{example.heading} not animated: {example.reason}")
     print(path)
     return 0
 
@@ -92,7 +92,7 @@ def part_of(path: str, allowed: Allowed, motion: bool) -> Part:
 
 def report_page(parts: Sequence[Part]) -> str:
     """Return the HTML of files; FileError as `text_of` raises it."""
-    links, body = {"words": "Words"}, []
+    links, body = {}, []
     for number, part in enumerate(parts):
         name = f"{Path(part.path).name}: " if len(parts) > 1 else ""
         sections = {
@@ -106,6 +106,7 @@ def report_page(parts: Sequence[Part]) -> str:
             if content:
                 links[anchor] = title
                 body.append(f"<section id='{anchor}'><h2>{title}</h2>\n{content}</section>")
+    links["words"] = "Words"
     glossary = tomllib.loads((TEMPLATES / "glossary.toml").read_text("utf-8"))
     style, script = ((TEMPLATES / name).read_text("utf-8") for name in ("page.css", "motion.js"))
     return Template((TEMPLATES / "page.html").read_text("utf-8")).substitute(

@@ -55,12 +55,12 @@ function round(length) {
 // height] in µm, y up.
 function drawing(data, [left, top, width, height], name) {
   const root = svg('svg', {viewBox: [left, top, width, height].join(' '), role: 'img',
-    'aria-label': name, class: 'bodies'});
+    'aria-label': 'the ' + name, class: name});
   const up = svg('g', {transform: 'scale(1,-1)'}, root), view = svg('g', {}, up);
   const bodies = data.paths.map((d) => svg('path', {d, class: 'body', 'fill-rule': 'evenodd'}, view));
   const length = round(width / 4), y = top + 0.97 * height, x = left + 0.03 * width;
-  svg('path', {d: `M${x},${y}h${length}`, stroke: 'currentColor', 'stroke-width': width / 150}, root);
-  svg('text', {x, y: y - width / 70, 'font-size': width / 25, fill: 'currentColor'}, root)
+  svg('path', {d: `M${x},${y}h${length}`, stroke: 'currentColor', 'stroke-width': width / 120}, root);
+  svg('text', {x, y: y - width / 70, 'font-size': width / (data.box ? 28 : 18), fill: 'currentColor'}, root)
     .textContent = `${length} µm`;
   return {root, up, view, bodies};
 }
@@ -82,7 +82,7 @@ function graph(data, panel) {
     const level = Y(data.zone);
     svg('rect', {x: left, y: level, width: right - left, height: bottom - level, class: 'zone'}, root);
     svg('path', {d: `M${left},${level}H${right}`, class: 'edge'}, root);
-    write(`D₀ = ${data.zone.toPrecision(4)}`, right, level - 4, 'end');
+    write(`D₀ = ${data.zone.toPrecision(4)} µm`, right, level - 4, 'end');
   }
   for (const [from, to, across] of [[times[0], times.at(-1), true], [low, high, false]]) {
     const step = round((to - from) / 3);
@@ -110,12 +110,12 @@ function graph(data, panel) {
 // A pair, seen from its first body: returns a function that shows a frame.
 function pair(data, panel) {
   const half = data.half;
-  const {root, view, bodies} = drawing(data, [-half, -half, 2 * half, 2 * half], 'the two flocs');
+  const {root, view, bodies} = drawing(data, [-half, -half, 2 * half, 2 * half], 'pair');
   panel.append(root);
   const mark = graph(data, panel), contacts = svg('g', {class: 'contacts', fill: 'none'}, view);
   bodies.forEach((body, n) => {
     body.style.fill = body.style.stroke = data.colour[0][n];
-    body.setAttribute('fill-opacity', .35); body.setAttribute('stroke-width', half / 160);
+    body.setAttribute('stroke-width', half / 160);
   });
   return (k) => {
     bodies.forEach((body, n) => {
@@ -132,7 +132,7 @@ function pair(data, panel) {
 // A swarm in its box, which may repeat itself: returns a function that shows a frame.
 function swarm(data, panel) {
   const [width, height] = data.box, [wide, high] = data.repeats;
-  const {root, up, view, bodies} = drawing(data, [0, -height, width, height], 'the swarm');
+  const {root, up, view, bodies} = drawing(data, [0, -height, width, height], 'swarm');
   panel.append(root);
   // Copies beside the box show what crosses its sides.
   view.id = `swarm${document.querySelectorAll('.motion svg').length}`;
@@ -140,7 +140,7 @@ function swarm(data, panel) {
     for (const y of high ? [0, -high, high] : [0]) if (x || y) svg('use', {href: '#' + view.id, x, y}, up);
   }
   bodies.forEach((body) => {
-    body.setAttribute('stroke', '#333'); body.setAttribute('stroke-width', width / 900);
+    body.setAttribute('stroke-width', width / 900);
   });
   const inside = (x, side) => side ? x - side * Math.floor(x / side) : x;
   return (k) => {

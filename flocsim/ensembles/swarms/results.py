@@ -37,7 +37,7 @@ from flocsim.io.results.swarm_file import SwarmResults
 from flocsim.io.terminal import in_words
 
 ON_EXAMPLES = (
-    "The first swarm. Each cluster of two or more flocs has a colour; single flocs are grey. "
+    "Each cluster of two or more flocs has a colour; single flocs are grey. "
     "Between snapshots, positions are interpolated. Along the sides on which the box repeats "
     "itself, the view moves with the flocs."
 )
@@ -307,7 +307,7 @@ class SwarmFiles(Contents):
         """Return the motion of the first swarm, by its snapshots."""
         from flocsim.io.plots.swarm import motion_data
 
-        return [Example("", "", motion_data(self.read(path)))]
+        return [Example("First swarm", "", motion_data(self.read(path)))]
 
     def running(self, found: Any) -> Facts:
         """Return facts of swarms that still run."""
