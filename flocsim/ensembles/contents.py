@@ -23,7 +23,7 @@ from flocsim.io.groups import UNREADABLE, FileFormat
 from flocsim.io.hdf5 import Unfit, open_hdf5
 from flocsim.io.labelled import Column, Labelled, Tables, with_unit
 from flocsim.io.results.run_group import source_line, stored
-from flocsim.io.terminal import aligned, table_along
+from flocsim.io.terminal import aligned, rows_along
 
 Facts = list[tuple[str, str]]
 """[(name, value)]."""
@@ -90,7 +90,7 @@ class Contents:
     swept: Sequence[str] = ()
     """Groups of results that sweeps join, the first being printed; none: they cannot be run."""
     swept_table: Any = None
-    """(that group, Labelled) → (heads, row) of `table_along` at the values of the swept keys."""
+    """(that group, Labelled) → (heads, row) of `rows_along` at the values of the swept keys."""
     compare: Any = None
     """(opened, opened) → Tables of differences, whose ``table(name)`` is text."""
     animate: Any = None
@@ -363,7 +363,8 @@ class Differences(Tables):
         both = f"the {self.pairs} {self.noun} that both have, paired"
         how = both if self.paired else "independent samples"
         title = f"{with_unit(text, unit)}, second minus first: {how}"
-        return "\n".join([*self.changes, title, "", table_along(axes, heads, row)])
+        table = aligned(rows_along(axes, heads, row))
+        return "\n".join([*self.changes, title, "", *table])
 
     def interval(self, at: Mapping[str, float]) -> str:
         """Return "+0.030 [+0.010, +0.050] -0.004 +0.010 *": a difference, what numerics may change

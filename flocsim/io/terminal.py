@@ -51,15 +51,6 @@ def in_words(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else visible(str(value), "")
 
 
-def table_along(
-    axes: Mapping[str, Any], heads: Sequence[str],
-    row: Callable[[tuple[int, ...]], Sequence[str]],
-    places: Iterable[tuple[int, ...]] | None = None, left: int = 0,
-) -> str:  # fmt: skip
-    """Return `rows_along` as text; ``left`` as in `aligned`."""
-    return "\n".join(aligned(rows_along(axes, heads, row, places), left))
-
-
 def rows_along(
     axes: Mapping[str, Any], heads: Sequence[str],
     row: Callable[[tuple[int, ...]], Sequence[str]],

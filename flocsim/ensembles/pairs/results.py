@@ -168,12 +168,10 @@ class PairFiles(Contents):
         if kernel is None:
             return self.pairs_answer(found)
         most, words = kernel.vertices.argmax(), []
-        for mechanism, alpha in zip(
-            kernel.mechanisms, kernel.arrays["alpha"][:, most], strict=True
-        ):
-            known = alpha[np.isfinite(alpha)]
-            if known.size:
-                words.append(f"{100 * known.min():.0f} to {100 * known.max():.0f} % by {mechanism}")
+        for mechanism, alpha in zip(kernel.mechanisms, kernel.arrays["alpha"], strict=True):
+            if np.isfinite(alpha[most]).any():
+                least, largest = 100.0 * np.nanmin(alpha[most]), 100.0 * np.nanmax(alpha[most])
+                words.append(f"{least:.0f} to {largest:.0f} % by {mechanism}")
         shares = ", ".join(words) or "an unknown fraction"
         return f"Of pairs that touch, by size, {shares} stick (N = {kernel.vertices[most]})."
 

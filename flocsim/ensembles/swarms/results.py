@@ -297,10 +297,10 @@ class SwarmFiles(Contents):
         """Return what the bodies have become by the end, means over swarms."""
         counts, (many, bodies) = found.groups["counts"], found.groups["bodies"]["floc"].shape
         clusters, size = (swarm_file.mean(counts[name])[-1] for name in ("clusters", "mean_size"))
-        form, over = ("forms", "") if many == 1 else ("form", f", means over {many} swarms")
+        over, time = f" (means over {many} swarms)" * (many > 1), found.scales["time"][-1]
         return (
-            f"After {found.scales['time'][-1]:g} s, a swarm of {bodies} flocs {form} "
-            f"{clusters:.3g} clusters; a floc is, on average, in a cluster of {size:.2g}{over}."
+            f"After {time:g} s, {bodies} flocs form {clusters:.3g} clusters; a floc is, on "
+            f"average, in a cluster of {size:.2g}{over}."
         )
 
     def examples(self, path: Any, allowed: Any) -> list[Example]:
