@@ -96,13 +96,13 @@ def setting_of(config, radii=None, **overrides):
         ("preset = 'clay'", "Preset clay: real weight, sea water of 15 °C and 35 g/kg."),
         (
             "preset = 'clay'\n[fluid]\nsalinity = 5.0",
-            "Preset clay with fluid.salinity = 5.0: real weight, brackish water of 15 °C and "
-            "5 g/kg.",
+            "Preset clay with values of its own for fluid: real weight, brackish water of 15 °C "
+            "and 5 g/kg.",
         ),
         (
             "preset = 'si'\n[fluid]\ntemperature = '10 degC'\nionic_strength = '10 mmol/l'",
-            "Preset si with fluid.temperature = 10 degC, fluid.ionic_strength = 10 mmol/l: "
-            "2650 kg/m³, water of 10 °C and 10 mmol/l of salt.",
+            "Preset si with values of its own for fluid: 2650 kg/m³, water of 10 °C and 10 mmol/l "
+            "of salt.",
         ),
         ("not TOML", ""),
     ],
@@ -120,4 +120,4 @@ def test_setting_says_how_heavy_the_flocs_of_the_paper_are():
 
 def test_setting_heeds_values_laid_over_the_config():
     found = setting_of("preset = 'tang2014'", preset="clay", fluid={"temperature": 283.15})
-    assert found.startswith("Preset clay with fluid.temperature = 283.15: real weight, sea water")
+    assert found.endswith("own for fluid: real weight, sea water of 10 °C and 35 g/kg.")

@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from flocsim.body import Fluid, FractalDensity
-from flocsim.ensembles.config.loader import Reading, lay_over, value_at
+from flocsim.ensembles.config.loader import Reading, lay_over
 from flocsim.ensembles.config.schema import PRESETS, BodiesConfig
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import parse
@@ -25,9 +24,6 @@ MOST_HANGING = 0.005
 
 PHYSICS = ("bodies", "fluid", "forces", "zone")
 """Tables whose values a preset gives."""
-
-MOST_CHANGES = 3
-"""Values that differ from the preset which are named."""
 
 
 def answer_sentence(results: Results) -> str:
@@ -72,23 +68,21 @@ def outlines_of(results: Results) -> str:
 def range_of(results: Results, vertices: int, surely: bool = False) -> str:
     """Return "41 % [36, 46]", or the lowest and the highest of several types, at an index of N; ""
     where there is none. ``surely``: all or none, in all types, stand without an interval."""
-    values, low, high = (results.pooled[f"pr_a{end}"][:, vertices] for end in ("", "_low", "_high"))
-    known = [int(place) for place in np.argsort(values) if not np.isnan(values[place])]
-    if not known:
+    every = zip(
+        *(results.pooled[f"pr_a{end}"][:, vertices] for end in ("", "_low", "_high")),
+        results.types, strict=True,
+    )  # fmt: skip
+    found = sorted(each for each in every if not np.isnan(each[0]))
+    if not found:
         return ""
-    if surely and {values[place] for place in known} in ({0.0}, {1.0}):
-        return f"{percent(values[known[0]])} %"
-
-    def words(place: int, named: bool) -> str:
-        ends = f"[{percent(low[place])}, {percent(high[place])}]"
-        kind = f" (type {results.types[place]})" if named else ""
-        return f"{percent(values[place])} % {ends}{kind}"
-
-    first, last = known[0], known[-1]
-    if values[first] == values[last]:
-        widest = max(known, key=lambda place: high[place] - low[place])
-        return words(widest, False)
-    return f"{words(first, True)} to {words(last, True)}"
+    alike = found[0][0] == found[-1][0]
+    if alike and surely and found[0][0] in (0.0, 1.0):
+        return f"{percent(found[0][0])} %"
+    # Of types that are alike the least certain; sorted, that is the one with the lowest end.
+    return " to ".join(
+        f"{percent(value)} % [{percent(low)}, {percent(high)}]{'' if alike else f' (type {name})'}"
+        for value, low, high, name in found[:1] + found[1:][-1:] * (not alike)
+    )
 
 
 def percent(value: float) -> str:
@@ -109,15 +103,13 @@ def hanging(table: Mapping[str, np.ndarray]) -> str:
 
 def left_out(table: Mapping[str, np.ndarray]) -> Iterator[str]:
     """Yield what became of the pairs that a probability leaves out, but for misses."""
-    total = int(table["n_total"].sum())
-    held, open_ended = (
-        sum(int(table[name].sum()) for name in names)
-        for names in (("n_held",), ("n_undecided", "n_failed"))
+    total, held, undecided, failed = (
+        int(table[f"n_{name}"].sum()) for name in ("total", "held", "undecided", "failed")
     )
     if held:
         yield f"; {held} of {total} pairs are held apart and never touch"
-    if open_ended:
-        yield f"; {open_ended} of {total} pairs have no outcome"
+    if undecided + failed:
+        yield f"; {undecided + failed} of {total} pairs have no outcome"
 
 
 def setting_sentence(results: Results) -> str:
@@ -134,34 +126,15 @@ def setting_sentence(results: Results) -> str:
     except (KeyError, ValueError, ConfigError, RecursionError):
         return ""
     name = str(given.get("preset", ""))
-    preset = PRESETS.get(name, {})
-    table, reading = lay_over(preset, given), Reading(Path(), Sources())
+    table, reading = lay_over(PRESETS.get(name, {}), given), Reading(Path(), Sources())
     fluid = reading.made(Fluid, table.get("fluid", {}), "fluid")
     bodies = reading.made(BodiesConfig, table.get("bodies", {}), "bodies")
-    words = f"Preset {name}{changes_to(preset, given)}" if name else "No preset"
+    words = f"Preset {name}" if name else "No preset"
+    if name and (own := [table for table in PHYSICS if given.get(table)]):
+        words += f" with values of its own for {' and '.join(own)}"
     if fluid is not None and bodies is not None:
         words += f": {weight_of(bodies, fluid, results)}, {water_of(fluid)}"
     return f"{words}."
-
-
-def changes_to(preset: Mapping[str, Any], given: Mapping[str, Any]) -> str:
-    """Return which values of a preset a config replaces, or what it adds to them."""
-    found = [
-        f"{key} = {value}" for key, value in leaves({k: given.get(k, {}) for k in PHYSICS})
-        if value_at(preset, key) != value
-    ]  # fmt: skip
-    more = len(found) - MOST_CHANGES
-    shown = ", ".join([*found[:MOST_CHANGES], *([f"{more} more"] if more > 0 else [])])
-    return f" with {shown}" if found else ""
-
-
-def leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield (dotted key, value) of nested dicts."""
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from leaves(value, f"{before}{key}.")
-        else:
-            yield f"{before}{key}", value
 
 
 def weight_of(bodies: BodiesConfig, fluid: Fluid, results: Results) -> str:
