@@ -215,7 +215,8 @@ def table_of(part: Part) -> str:
         cells = (re.sub(r"(\[.*\])$", r"<small>\1</small>", text(cell)) for cell in row)
         lines.append(f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>")
     body = "\n".join(lines)
-    return f"<div class='scroll'><table>{body}</table></div>"
+    note = "<p class='source'>In brackets: 95 % intervals of sampling.</p>" * ("<small>" in body)
+    return f"<div class='scroll'><table>{body}</table></div>{note}"
 
 
 def made_of(part: Part) -> str:

@@ -172,8 +172,8 @@ class PairFiles(Contents):
             if np.isfinite(alpha[most]).any():
                 least, largest = 100.0 * np.nanmin(alpha[most]), 100.0 * np.nanmax(alpha[most])
                 words.append(f"{least:.0f} to {largest:.0f} % by {mechanism}")
-        shares = ", ".join(words) or "an unknown fraction"
-        return f"Of pairs that touch, by size, {shares} stick (N = {kernel.vertices[most]})."
+        which = f"N = {kernel.vertices[most]}, over all sizes"
+        return f"Of pairs that touch, these stick ({which}): {', '.join(words) or 'unknown'}."
 
     def rows(self, results: schema.Results) -> list[list[str]]:
         """Return counts and probabilities of every condition; of rates there is the text."""
