@@ -1,131 +1,123 @@
 """`flocsim report r.h5`: all that a results file holds on one page for a browser.
 
 Everything that comes from a file is escaped, so that it cannot become code in a browser, and the
-page may load nothing (Content-Security-Policy).
-
-A collision on it is a drawing that moves: SVG outlines that the script places, frame by frame.
-Lengths in it are µm, y points up, and everything is seen from the receiving body's centroid.
+page may load nothing (Content-Security-Policy in templates/page.html). templates/motion.js draws
+the motions, whose data stand on the page, and links words to the glossary.
 """
 
 import argparse
 import base64
 import io
 import json
-import math
-from collections.abc import Sequence
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
+from string import Template
 from typing import Any
 
+import attrs
 import numpy as np
 
 from flocsim.commands import add_allowed, add_overwrite, allowed_by
+from flocsim.ensembles.config.sources import Allowed
 from flocsim.ensembles.contents import Contents, Example, open_kind, text_of
 from flocsim.errors import visible
 from flocsim.io.files import write_file
 from flocsim.io.outputs import check_outputs
-from flocsim.io.plots.collision import (
-    CONTACT_COLOUR,
-    Frames,
-    draw_distance,
-    rounded_length,
-    time_unit,
-    windows,
-)
-from flocsim.io.plots.style import (
-    BODY_COLOURS,
-    CLASS_WORDS,
-    METADATA,
-    MICRO,
-    Figure,
-    add_foot,
-    house_style,
-)
-from flocsim.io.trajectory import centre_distance
-from flocsim.trajectories.figures import frames_of, seen_from_first
+from flocsim.io.plots.collision import svg_path
+from flocsim.io.plots.style import METADATA, MICRO, add_foot, house_style
 
 TEMPLATES = Path(__file__).with_name("templates")
 
-POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-"""Nothing is loaded from anywhere, whatever the file says of itself."""
+MOST_SHOWN = 3
+"""Figures that are not folded."""
 
-FRAMES = 150
+MOST_OUTLINES = 12
 
-IN_MOTION = (
-    "<p>The first replicate of each class, for the flocs with the most vertices, run again from "
-    "the seed, in the frame of the receiving floc. Frames are spaced by distance, not by time. Red "
-    "rings mark overlapping outlines.</p>"
-)
+SHOWN = ("preset", "shapes", "seed", "command", "date", "flocsim_version", "processor")
+"""What the page says of how a file was made, by the names in its group ``run``; all else of it is
+folded."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Write one HTML page on a file that needs no other file: what flocsim info prints of it, the
-    figures of flocsim plot, and its config; of pairs one replicate of each class (A to D) to
-    watch, which is run again for it.
+    """Write one HTML page on a file, or on several, that needs no other file: what was found in a
+    sentence, figures, a table, motions to watch, and how it was made. Of pairs one replicate of
+    each class (A to D) is run again for it.
 
-    results: file that flocsim wrote
+    results: files that flocsim wrote
     --output FILE.html: page to write (default: r.html for r.h5, in the current folder)
-    --no-motion: do not run replicates again: a page without motion
+    --no-motion: do not run replicates again: a page without motion and outlines of flocs
     """
     add = parser.add_argument
-    add("results")
+    add("results", nargs="+")
     add("-o", "--output")
     add("--no-motion", action="store_true")
     add_allowed(parser)
     add_overwrite(parser)
 
 
+@attrs.frozen(eq=False)
+class Part:
+    """A file on a page: what it holds, and ``motions`` and ``outlines`` {name: Shape} of flocs."""
+
+    path: str
+    kind: Contents
+    found: Any
+    motions: Sequence[Example] = ()
+    outlines: Mapping[str, Any] = attrs.Factory(dict)
+
+
 def run(args: argparse.Namespace) -> int:
     """Write the page and print its path; returns the exit code."""
-    path = Path(args.output or f"{Path(args.results).stem}.html")
-    check_outputs([path], args.overwrite, [args.results], endings=(".html",))
-    kind, file = open_kind(args.results)
-    found = kind.read(file)
-    examples = [] if args.no_motion else kind.examples(file, allowed_by(args))
-    write_file(path, report_page(str(args.results), kind, found, examples).encode(), args.overwrite)
-    for example in examples:
-        if example.reason:
-            print(f"class {example.outcome} not animated: {example.reason}")
+    path = Path(args.output or f"{Path(args.results[0]).stem}.html")
+    check_outputs([path], args.overwrite, args.results, endings=(".html",))
+    parts = [part_of(each, allowed_by(args), not args.no_motion) for each in args.results]
+    write_file(path, report_page(parts).encode(), args.overwrite)
+    for example in (each for part in parts for each in part.motions if each.reason):
+        print(f"{example.heading} not animated: {example.reason}")
     print(path)
     return 0
 
 
-def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Example]) -> str:
-    """Return the HTML of a file; FileError as `text_of` raises it."""
-    # Outcomes and the figure of everything come first.
-    figures, first, source = kind.figures(found), ("outcomes", "overview"), kind.source(found)
-    names = sorted(figures, key=lambda name: first.index(name) if name in first else len(first))
-    config = str(getattr(found, "run", {}).get("config", ""))
-    motions = "\n".join(map(motion_of, examples))
-    sections = {
-        "Results": verbatim(text_of(path, kind, found)),
-        "Figures": "\n".join(figure_of(name, figures[name], found, source) for name in names),
-        "Motion": motions and f"{IN_MOTION}<div class='motions'>{motions}</div>",
-        "Config": config and verbatim(config),
-    }
-    shown = {head: content for head, content in sections.items() if content}
-    links = " ".join(f"<a href='#{head.lower()}'>{head}</a>" for head in shown)
-    body = "\n".join(
-        f"<section id='{head.lower()}'><h2>{head}</h2>\n{content}</section>"
-        for head, content in shown.items()
-    )
-    title = text(f"{path}: {kind.title}")
+def part_of(path: str, allowed: Allowed, motion: bool) -> Part:
+    """Return the Part of a file; FileError for one that cannot be read."""
+    kind, file = open_kind(path)
+    found = kind.read(file)
+    if not motion:
+        return Part(path, kind, found)
+    return Part(path, kind, found, kind.examples(file, allowed), kind.outlines(file, allowed))
+
+
+def report_page(parts: Sequence[Part]) -> str:
+    """Return the HTML of files; FileError as `text_of` raises it."""
+    links, body = {}, []
+    for number, part in enumerate(parts):
+        name = f"{Path(part.path).name}: " if len(parts) > 1 else ""
+        sections = {
+            "Figures": figures_of(part),
+            "Motion": motions_of(part),
+            "Table": table_of(part),
+            "How it was made": made_of(part),
+        }
+        for head, content in sections.items():
+            anchor, title = f"{head.split()[0].lower()}{number or ''}", text(f"{name}{head}")
+            if content:
+                links[anchor] = title
+                body.append(f"<section id='{anchor}'><h2>{title}</h2>\n{content}</section>")
+    links["words"] = "Words"
+    glossary = tomllib.loads((TEMPLATES / "glossary.toml").read_text("utf-8"))
     style, script = ((TEMPLATES / name).read_text("utf-8") for name in ("page.css", "motion.js"))
-    return f"""<!DOCTYPE html>
-<html lang='en'><head><meta charset='utf-8'>
-<meta http-equiv="Content-Security-Policy" content="{POLICY}">
-<meta name='viewport' content='width=device-width, initial-scale=1'>
-<title>{title}</title>
-<style>
-{style}</style></head>
-<body>
-<h1>{title}</h1>
-<p>{text(source)}</p>
-<nav>{links}</nav>
-{body}
-<script>{script}</script>
-</body></html>
-"""
+    return Template((TEMPLATES / "page.html").read_text("utf-8")).substitute(
+        title=text(", ".join(f"{part.path}: {part.kind.title}" for part in parts)),
+        answers="\n".join(map(answer_of, parts)),
+        links="\n".join(f"<a href='#{anchor}'>{title}</a>" for anchor, title in links.items()),
+        body="\n".join(body),
+        words="\n".join(f"<dt>{text(k)}</dt><dd>{text(v)}</dd>" for k, v in glossary.items()),
+        style=style,
+        script=script,
+    )
 
 
 def text(value: object) -> str:
@@ -139,102 +131,123 @@ def verbatim(words: str) -> str:
     return f"<pre>{lines}</pre>"
 
 
-def data_of(figure: Figure) -> str:
-    """Return a figure as an address that holds all of it."""
-    picture = io.BytesIO()
-    with house_style():
-        figure.savefig(picture, format="svg", metadata=METADATA["svg"])
-    return f"data:image/svg+xml;base64,{base64.b64encode(picture.getvalue()).decode()}"
+def folded(summary: str, content: str) -> str:
+    """Return content that is shown on a click; "" for none."""
+    return content and f"<details><summary>{text(summary)}</summary>\n{content}</details>"
+
+
+def answer_of(part: Part) -> str:
+    """Return what a file found in a large sentence, of which flocs and water, and its warnings."""
+    kind, found = part.kind, part.found
+    answer = kind.answer(found) or f"{kind.title[0].upper()}{kind.title[1:]}"
+    lines = {
+        "file": [f"{part.path}: {kind.title}"],
+        # What belongs together stays in one line.
+        "answer": [answer.replace(" %", "\u00a0%").replace(" = ", "\u00a0=\u00a0")],
+        "setting": [kind.setting(found)],
+        "source": filter(None, [kind.mark(found), kind.source(found)]),
+        "warning": kind.summary(found).warnings,
+    }
+    found = {name: "<br>".join(map(text, words)) for name, words in lines.items()}
+    tags = {"answer": "h1"}
+    return "\n".join(
+        f"<{tags.get(name, 'p')} class='{name}'>{words}</{tags.get(name, 'p')}>"
+        for name, words in found.items()
+        if words
+    )
+
+
+def figures_of(part: Part) -> str:
+    """Return the most telling figures, and the others folded."""
+    figures = part.kind.figures(part.found)
+    names = [name for name in dict.fromkeys([*part.kind.first, *figures]) if name in figures]
+    foot = part.kind.source(part.found)
+    drawn = [figure_of(name, figures[name], part.found, foot) for name in names]
+    more = "\n".join(drawn[MOST_SHOWN:])
+    return "\n".join([*drawn[:MOST_SHOWN], folded("More figures", more)])
 
 
 def figure_of(name: str, draw: Any, results: Any, foot: str) -> str:
-    """Return a figure of `flocsim plot` inside the page, its caption being the help of it."""
+    """Return a figure of `flocsim plot` inside the page, its caption being the help of it.
+
+    On a narrow page it keeps four fifths of its size, to be readable, and scrolls in its box.
+    """
+    picture = io.BytesIO()
     with house_style():
         figure = draw(results)
         add_foot(figure, foot)
-    title = f"Figure {name}" if name.isdigit() else name.capitalize()
-    caption = text(f"{title}: {(draw.__doc__ or '').partition(chr(10))[0]}")
+        figure.savefig(picture, format="svg", metadata=METADATA["svg"])
+    caption = f"Figure {name}: " * name.isdigit() + (draw.__doc__ or "").partition("\n")[0]
+    data, wide = base64.b64encode(picture.getvalue()).decode(), 96 * figure.bbox.width / figure.dpi
     return (
-        f"<figure><img alt='{caption}' src='{data_of(figure)}'>"
-        f"<figcaption>{caption}</figcaption></figure>"
+        f"<figure><div class='scroll'><div class='paper'><img alt='{text(caption)}' "
+        f"style='width:{1.3 * wide:.0f}px;max-width:100%;min-width:{0.8 * wide:.0f}px' "
+        f"src='data:image/svg+xml;base64,{data}'></div></div>"
+        f"<figcaption>{text(caption)}</figcaption></figure>"
     )
 
 
-def motion_of(example: Example) -> str:
-    """Return the HTML of an Example: drawing, graph of d_c, slider; or why there is none."""
-    heading = f"<b>{text(CLASS_WORDS[example.outcome])}</b><br>{text(example.title)}"
-    if example.trajectory is None:
-        return (
-            f"<figure class='motion'><figcaption>{heading}<br>Not shown in motion: "
-            f"{text(example.reason)}</figcaption></figure>"
+def motions_of(part: Part) -> str:
+    """Return the motions of a file, which the script draws, and how they were chosen."""
+    shown = []
+    for each in part.motions:
+        data = text(json.dumps(each.data, ensure_ascii=False)) if each.data else ""
+        why = f"<br>Not shown in motion: {text(each.reason)}" if each.reason else ""
+        shown.append(
+            f"<figure class='motion' data-frames='{data}'><figcaption><b>{text(each.heading)}</b>"
+            f"<br>{text(each.title)}{why}</figcaption></figure>"
         )
-    run = example.trajectory
-    frames, touch = frames_of(run, FRAMES), float(run.row["t_collision"])
-    shown = int(np.abs(frames.times - touch).argmin()) if math.isfinite(touch) else 0
-    pose = seen_from_first(run.at(frames.times).position) * [MICRO, MICRO, 180.0 / math.pi]
-    # The middle of both bodies in every frame, and one half width that fits them all.
-    eyes, half = windows(frames.outlines)
-    unit, factor = time_unit(run.t)
-    graph, dots = graph_of(run, frames, example.zone_distance, factor)
-    data = {
-        "shown": shown, "eye": rounded(MICRO * eyes), "ring": 0.03 * MICRO * half,
-        "pose": rounded(pose), "dot": rounded(dots), "t": frames.times.tolist(),
-        "contacts": [rounded(MICRO * each) for each in frames.contacts],
-        "words": [
-            f"t = {time * factor:.4g} {unit}, d_c = {MICRO * distance:.4g} µm"
-            for time, distance in zip(frames.times, frames.centre_distance, strict=True)
-        ],
-    }  # fmt: skip
-    bodies = drawing_of(run.shapes, data, MICRO * half)
+    chosen = text(part.kind.on_examples)
+    return f"<p>{chosen}</p>\n<div class='motions'>{''.join(shown)}</div>" if shown else ""
+
+
+def table_of(part: Part) -> str:
+    """Return the numbers of a file as a table that scrolls in its own box, or as text.
+
+    An interval is set smaller than its value.
+    """
+    heads, *rows = part.kind.rows(part.found) or [[]]
+    if not heads:
+        plain = part.kind.table(part.found)
+        return plain and verbatim(plain)
+    lines = [f"<thead><tr>{''.join(f'<th>{text(head)}</th>' for head in heads)}</tr></thead>"]
+    for row in rows:
+        cells = (re.sub(r"(\[.*\])$", r"<small>\1</small>", text(cell)) for cell in row)
+        lines.append(f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>")
+    body = "\n".join(lines)
+    note = "<p class='source'>In brackets: 95 % intervals of sampling.</p>" * ("<small>" in body)
+    return f"<div class='scroll'><table>{body}</table></div>{note}"
+
+
+def made_of(part: Part) -> str:
+    """Return how a file was made: its preset, flocs and command; its config and all that `flocsim
+    info` prints are folded."""
+    run = getattr(part.found, "run", {})
+    facts = "\n".join(
+        f"<dt>{text(name.replace('_', ' '))}</dt><dd>{text(run[name])}</dd>"
+        for name in SHOWN
+        if run.get(name, "") != ""
+    )
+    config, info = str(run.get("config", "")), text_of(part.path, part.kind, part.found)
     return (
-        f"<figure class='motion' data-frames='{text(json.dumps(data, ensure_ascii=False))}'>"
-        f"<figcaption>{heading}</figcaption>\n<div class='panels'>{bodies}{graph}</div>"
-        "<div class='controls'><button type='button'>Play</button><input type='range' min='0' "
-        f"max='{len(frames.times) - 1}' value='{shown}' aria-label='frame'>"
-        f"<output>{text(data['words'][shown])}</output></div></figure>"
+        f"<dl class='facts'>{facts}</dl>\n{thumbnails(part.outlines)}\n"
+        f"{folded('The config file', config and verbatim(config))}\n"
+        f"{folded('All that flocsim info prints', verbatim(info))}"
     )
 
 
-def rounded(values: np.ndarray) -> list:
-    """Return lists of numbers to a picometre, or a millionth of a degree."""
-    return np.round(values, 6).tolist()
-
-
-def drawing_of(shapes: Sequence, data: dict, half: float) -> str:
-    """Return the bodies with a scale bar; the script places them."""
-    bodies = []
-    for shape, colour in zip(shapes, BODY_COLOURS, strict=False):
-        rings = (MICRO * ring for ring in shape.outline(0.0, 0.0, 0.0))
-        path = " ".join("M" + " ".join(f"{u:.5g},{v:.5g}" for u, v in ring) + "Z" for ring in rings)
-        bodies.append(
-            f"<path class='body' d='{path}' fill='{colour}' fill-opacity='.3' stroke='{colour}' "
-            f"fill-rule='evenodd' stroke-width='{0.006 * half:.3g}'/>"
+def thumbnails(shapes: Mapping[str, Any]) -> str:
+    """Return outlines of flocs, from the smallest to the largest, each to fill its box."""
+    names = sorted(shapes, key=lambda name: shapes[name].equivalent_radius)
+    places = np.linspace(0, len(names) - 1, min(MOST_OUTLINES, len(names))).round().astype(int)
+    pictures = []
+    for name in (names[place] for place in places):
+        shape, reach = shapes[name], 1.05 * MICRO * shapes[name].bounding_radius
+        pictures.append(
+            f"<figure><svg viewBox='{-reach:.5g} {-reach:.5g} {2 * reach:.5g} {2 * reach:.5g}'>"
+            f"<path transform='scale(1,-1)' fill-rule='evenodd' fill='currentColor' "
+            f"d='{svg_path(shape.outline(0.0, 0.0, 0.0))}'/></svg>"
+            f"<figcaption>{text(name)}</figcaption></figure>"
         )
-    length, left, level = MICRO * rounded_length(0.5 * half / MICRO), -0.94 * half, 0.94 * half
-    return (
-        f"<svg role='img' aria-label='the two flocs' viewBox='{-half:.5g} {-half:.5g} "
-        f"{2 * half:.5g} {2 * half:.5g}'><g transform='scale(1,-1)'><g class='view'>"
-        f"{''.join(bodies)}<g class='contacts' fill='none' stroke='{CONTACT_COLOUR}' "
-        f"stroke-width='{0.009 * half:.3g}'></g></g></g><path d='M{left:.5g},{level:.5g}"
-        f"h{length:.5g}' stroke='#111' stroke-width='{0.02 * half:.3g}'/><text x='{left:.5g}' "
-        f"y='{level - 0.03 * half:.5g}' font-size='{0.075 * half:.3g}'>{length:g} µm</text></svg>"
-    )
-
-
-def graph_of(run: Any, frames: Frames, zone: float, factor: float) -> tuple[str, np.ndarray]:
-    """Return (SVG of the centre distance against time, with D_0 and a dot that the script moves,
-    places (f, 2) of the dot); ``factor``: from seconds to the unit of its axis."""
-    figure = draw_distance(run.t.tolist(), centre_distance(run.position).tolist(), zone)
-    with house_style():
-        figure.draw_without_rendering()
-        data = data_of(figure)
-    # Points from the upper left corner, as in the SVG.
-    scale = 72.0 / figure.dpi
-    width, height = scale * figure.bbox.width, scale * figure.bbox.height
-    points = np.stack([frames.times * factor, frames.centre_distance * MICRO], axis=1)
-    dots = scale * figure.axes[0].transData.transform(points) * [1.0, -1.0] + [0.0, height]
-    return (
-        f"<svg role='img' aria-label='centre distance against time' viewBox='0 0 {width:.6g} "
-        f"{height:.6g}'><image href='{data}' width='{width:.6g}' height='{height:.6g}'/>"
-        f"<circle class='now' r='3' fill='{BODY_COLOURS[0]}'/></svg>"
-    ), dots
+    few = f"<p class='source'>{len(places)} of {len(names)} flocs, from small to large.</p>"
+    return f"<div class='flocs'>{''.join(pictures)}</div>{few}" if pictures else ""

@@ -23,7 +23,7 @@ from flocsim.io.groups import UNREADABLE, FileFormat
 from flocsim.io.hdf5 import Unfit, open_hdf5
 from flocsim.io.labelled import Column, Labelled, Tables, with_unit
 from flocsim.io.results.run_group import source_line, stored
-from flocsim.io.terminal import table_along
+from flocsim.io.terminal import aligned, rows_along
 
 Facts = list[tuple[str, str]]
 """[(name, value)]."""
@@ -51,15 +51,14 @@ class Summary:
     failed: list[str] = attrs.Factory(list)
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen
 class Example:
-    """A replicate of a class: ``title`` says which, ``trajectory`` is None where it could not be
-    run again, which ``reason`` says; ``zone_distance`` D_0 [m]."""
+    """A motion to watch: ``heading`` names it, ``title`` says which; ``data`` is for the script of
+    a page, and None where it could not be run again, which ``reason`` says."""
 
-    outcome: str
+    heading: str
     title: str
-    trajectory: Any = None
-    zone_distance: float = float("nan")
+    data: Mapping[str, Any] | None = None
     reason: str = ""
 
 
@@ -82,12 +81,16 @@ class Contents:
 
     title: str
     file: FileFormat
+    first: Sequence[str] = ()
+    """Figures that a page shows first."""
+    on_examples: str = ""
+    """What a page says of the motions that `examples` gives."""
     compared: Mapping[str, str] = {}
     """{name: words} of what can be compared."""
     swept: Sequence[str] = ()
     """Groups of results that sweeps join, the first being printed; none: they cannot be run."""
     swept_table: Any = None
-    """(that group, Labelled) → (heads, row) of `table_along` at the values of the swept keys."""
+    """(that group, Labelled) → (heads, row) of `rows_along` at the values of the swept keys."""
     detailed: Any = None
     """(found, whether to add numerical errors, whether all columns) → its numbers as text."""
     compare: Any = None
@@ -108,9 +111,13 @@ class Contents:
         """Return what a file says of itself; ValueError where that cannot be read."""
         raise NotImplementedError
 
+    def rows(self, found: Any) -> list[list[str]]:
+        """Return its numbers as cells of a table, heads first; [] where there is only `table`."""
+        return []
+
     def table(self, found: Any) -> str:
         """Return its numbers as text."""
-        return ""
+        return "\n".join(aligned(self.rows(found)))
 
     def figures(self, found: Any) -> Figures:
         """Return the figures that a file has."""
@@ -137,8 +144,12 @@ class Contents:
         return self.read(path)
 
     def examples(self, path: Any, allowed: Allowed) -> list[Example]:
-        """Return replicates that are worth watching."""
+        """Return motions that are worth watching."""
         return []
+
+    def outlines(self, path: Any, allowed: Allowed) -> dict[str, Any]:
+        """Return {name of a floc: its Shape}, of those that a study draws from."""
+        return {}
 
     # What rank 0 asks of a kind of study.
 
@@ -360,7 +371,7 @@ class Differences(Tables):
         both = f"the {self.pairs} {self.noun} that both have, paired"
         how = both if self.paired else "independent samples"
         title = f"{with_unit(text, unit)}, second minus first: {how}"
-        lines = [*self.changes, title, "", table_along(axes, heads, row)]
+        lines = [*self.changes, title, "", *aligned(rows_along(axes, heads, row))]
         lines.append(
             "[low, high]: 95 % interval of sampling; *: without 0, numerical error included"
         )

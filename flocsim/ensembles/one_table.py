@@ -24,7 +24,7 @@ from flocsim.io.groups import FileFormat, Group, Schema, Stored, declared
 from flocsim.io.labelled import Labelled, with_unit
 from flocsim.io.results.run_group import describe_note
 from flocsim.io.results.schema import AXES, COORDINATES
-from flocsim.io.terminal import in_words, table_along
+from flocsim.io.terminal import in_words, rows_along
 
 ROWS = "replicates"
 
@@ -90,9 +90,9 @@ class OneTable(Contents):
         many = asked["replicates"] * len(store.conditions)
         return self.stored(store, asked, there, {}), store.there(), many
 
-    def table(self, found: Stored) -> str:
+    def rows(self, found: Stored) -> list[list[str]]:
         """Return means over replicates, a row for each condition."""
-        return table_along(axes_in(found), *self.swept_table(found.labelled(ROWS)))
+        return rows_along(axes_in(found), *self.swept_table(found.labelled(ROWS)))
 
     def swept_table(self, table: Labelled) -> tuple[Sequence[str], Row]:
         """Return means over replicates: heads, and the cells at a place along the other axes."""

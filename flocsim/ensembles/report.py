@@ -21,7 +21,7 @@ FURTHER = ("collided", "inside", *OTHER)
 """Counts that have columns of their own only where all are asked for."""
 
 LEGEND = (
-    "A, B: contact inside the zone, then stick, part; C, D: the same outside; Pr[A]: A + C of them.",
+    "A, B: contact inside the zone, then stick, part; C, D: the same outside; Pr[A]: A + C of all.",
     "[low, high]: 95 % sampling interval; –: no pair touched; other: no contact, or no outcome.",
 )
 """Lines below a table of probabilities."""

@@ -37,7 +37,7 @@ from flocsim.io.results.run_group import SOURCE
 from flocsim.io.results.schema import AXES
 from flocsim.io.results.sweep_file import SweepResults, Swept, read_sweep, write_sweep
 from flocsim.io.seals import held
-from flocsim.io.terminal import in_words, table_along
+from flocsim.io.terminal import in_words, rows_along
 
 Facts = dict[str, Any]
 
@@ -258,7 +258,12 @@ class SweepFiles(Contents):
             for name, each in found.swept.items()
         ])  # fmt: skip
 
-    def table(self, found: SweepResults) -> str:
+    def answer(self, found: SweepResults) -> str:
+        """Return what was swept."""
+        keys = " and ".join(each.key for each in found.swept.values())
+        return f"How outcomes depend on {keys}."
+
+    def rows(self, found: SweepResults) -> list[list[str]]:
         """Return numbers at every value."""
         kind = next(each for each in kinds_joined() if {*each.swept} == found.groups.keys())
         table = found.labelled(kind.swept[0])
@@ -266,7 +271,7 @@ class SweepFiles(Contents):
             name: table.axes[name].values for name in table.shared_axes
             if name not in ("replicate", "time")
         }  # fmt: skip
-        return table_along(axes, *kind.swept_table(table))
+        return rows_along(axes, *kind.swept_table(table))
 
     def figures(self, found: SweepResults) -> Figures:
         """Return figures along a swept key."""

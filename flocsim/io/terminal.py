@@ -51,22 +51,22 @@ def in_words(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else visible(str(value), "")
 
 
-def table_along(
+def rows_along(
     axes: Mapping[str, Any], heads: Sequence[str],
     row: Callable[[tuple[int, ...]], Sequence[str]],
-    places: Iterable[tuple[int, ...]] | None = None, left: int = 0,
-) -> str:  # fmt: skip
-    """Return a table as text, with a row for every place along some axes, or for these ``places``.
+    places: Iterable[tuple[int, ...]] | None = None,
+) -> list[list[str]]:  # fmt: skip
+    """Return heads, and a row for every place along some axes, or for these ``places``.
 
     ``axes`` {name: values}: the coordinates, with which each row begins; ``row``: the cells that
-    follow at a place, which has an index along each of the axes; ``left`` as in `aligned`.
+    follow at a place, which has an index along each of the axes.
     """
     rows = [[*axes, *heads]]
     every = product(*(range(len(each)) for each in axes.values()))
     for place in every if places is None else places:
         keys = [in_words(values[k]) for values, k in zip(axes.values(), place, strict=True)]
         rows.append([*keys, *row(place)])
-    return "\n".join(aligned(rows, left))
+    return rows
 
 
 def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -14,7 +14,7 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.io.files import Rule
 from flocsim.io.outputs import check_ending
 from flocsim.io.plots import collision
-from flocsim.io.plots.style import CLASS_WORDS, MOST_OF_TITLE, Figure, plain
+from flocsim.io.plots.style import BODY_COLOURS, CLASS_WORDS, MICRO, MOST_OF_TITLE, Figure, plain
 from flocsim.io.trajectory import centre_distance
 from flocsim.trajectories.replay import motion_at
 
@@ -70,6 +70,9 @@ def frames_at(
         centre_distance(places) if apart else np.zeros(len(times)),
     )
 
+
+APPROACH_FRAMES, CONTACT_FRAMES = 50, 100
+"""Frames of a motion on a page before the first touch and from then on: it shows the contact."""
 
 FIGURES = ("strip", "distance", "forces", "energies")
 MOST_FRAMES = 500
@@ -138,6 +141,40 @@ def animated(trajectory: Any, path: Path, frames: int, title: str = "", rule: Ru
     _, zone = touch_and_zone(trajectory)
     told = plain(title, MOST_OF_TITLE)
     collision.write_animation(path, seen, distances(trajectory), zone, told, rule)
+
+
+def motion_data(run: Any) -> dict[str, Any]:
+    """Return what the script of a page needs to show a study's replicate.
+
+    Lengths in µm, to a picometre; bodies are seen from the first. Frames are evenly spaced along
+    the way of the bodies, apart for the approach and for the contact.
+    """
+    touch, zone = touch_and_zone(run)
+    sizes = [shape.bounding_radius for shape in run.shapes]
+    after = run.t > touch
+    found = [
+        instants_along(run.t[part], run.position[part], sizes, count)
+        for part, count in ((~after, APPROACH_FRAMES), (after, CONTACT_FRAMES)) if part.sum() > 1
+    ]  # fmt: skip
+    times = np.unique(np.concatenate([run.t[[0, -1]], [touch], *found]))
+    places = run.at(times).position
+    frames = frames_at(run.shapes, times, places, run.position)
+    # The middle of both bodies in every frame, and one half width that fits them all.
+    eyes, half = collision.windows(frames.outlines)
+    unit, factor = collision.time_unit(run.t)
+    pose = seen_from_first(places) * [MICRO, MICRO, math.degrees(1.0)]
+    distances = (MICRO * frames.centre_distance).tolist()
+    return {
+        "paths": [collision.svg_path(shape.outline(0.0, 0.0, 0.0)) for shape in run.shapes],
+        "colour": [BODY_COLOURS[: len(run.shapes)]], "pose": pose.round(6).tolist(),
+        "eye": (MICRO * eyes).round(6).tolist(), "half": MICRO * half,
+        "contacts": [(MICRO * each).round(6).tolist() for each in frames.contacts],
+        "t": times.tolist(), "unit": [unit, factor], "distance": distances,
+        "zone": MICRO * zone if math.isfinite(zone) else None,
+        "shown": int(np.abs(times - touch).argmin()), "between": 1,
+        "words": [f"t = {factor * time:.4g} {unit}, d_c = {distance:.4g} µm"
+                  for time, distance in zip(times, distances, strict=True)],
+    }  # fmt: skip
 
 
 def distances(trajectory: Any) -> tuple[list[float], list[float]]:

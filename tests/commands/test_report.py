@@ -5,6 +5,7 @@ import base64
 import html
 import json
 import re
+import shutil
 from html.parser import HTMLParser
 
 import numpy as np
@@ -17,10 +18,9 @@ from flocsim.ensembles.script_study import Study
 from flocsim.errors import FileError, UsageError, visible
 from flocsim.io.plots import results as drawings
 from flocsim.io.plots.results import FIGURES
-from flocsim.io.results.file import first_of_each, read_results
+from flocsim.io.results.file import instructive_of_each, read_results
 from flocsim.io.results.run_group import provenance
 from flocsim.io.results.schema import OUTCOMES
-from tests.helpers.browser import browser, open_page
 from tests.helpers.results_files import write_results
 from tests.helpers.small_study import write_small
 from tests.helpers.synthetic_results import make_results
@@ -135,17 +135,29 @@ def test_wrong_names_are_refused(made_up):
         call("absent.h5")
 
 
-def test_the_first_of_each_outcome_has_the_most_vertices(made_up):
+def test_the_replicate_shown_is_near_the_upper_quartile_of_its_class(made_up):
     results = read_results("r.h5")
-    found = first_of_each(results)
     outcome = results.replicates["outcome"]
-    for code, name in enumerate(OUTCOMES):
-        places = np.argwhere(outcome == code)
-        if name in found:
-            assert outcome[found[name]] == code
-            assert results.vertices[found[name][1]] == results.vertices[places[:, 1]].max()
-        else:
-            assert not len(places)
+    times = results.replicates["t_end"] - results.replicates["t_collision"]
+    found = instructive_of_each(results)
+    assert list(found) == [name for code, name in enumerate("ABCD") if np.any(outcome == code)]
+    for name, (place, why) in found.items():
+        of_class = outcome == OUTCOMES.index(name)
+        most = max(v for v in range(len(results.vertices)) if of_class[:, v].any())
+        times_there = times[:, most][of_class[:, most]]
+        assert place[1] == most and outcome[place] == OUTCOMES.index(name)
+        assert abs(times[place] - np.quantile(times_there, 0.75)) == pytest.approx(
+            np.abs(times_there - np.quantile(times_there, 0.75)).min()
+        )
+        assert f"chosen from {len(times_there)} pairs" in why
+
+
+def test_a_page_of_two_files_has_the_answers_first(made_up):
+    shutil.copy("r.h5", "s.h5")
+    assert call("r.h5", "s.h5", "--no-motion", "--output", "both.html") == 0
+    text = (made_up / "both.html").read_text("utf-8")
+    assert text.count("<h1") == 2 and text.rindex("<h1") < text.index("<section")
+    assert {"figures", "figures1", "table", "table1"} <= Page(text).ids
 
 
 def test_what_cannot_be_run_again_is_said(made_up, capsys):
@@ -158,14 +170,12 @@ def test_what_cannot_be_run_again_is_said(made_up, capsys):
 def test_motion_is_that_of_the_replicate(real):
     path, file = real
     text = file.read_text("utf-8")
-    found = first_of_each(read_results(path))
-    classes = [name for name in "ABCD" if name in found]
+    found = instructive_of_each(read_results(path))
     motions = [json.loads(html.unescape(each))
                for each in re.findall(r"data-frames='([^']*)'", text)]  # fmt: skip
-    assert len(motions) == len(classes) > 0
+    assert len(motions) == len(found) > 0
     opened = flocsim.open(path)
-    for name, motion in zip(classes, motions, strict=True):
-        t, v, d, k = found[name]
+    for ((t, v, d, k), _), motion in zip(found.values(), motions, strict=True):
         run = opened.replicate(k, opened.types[t], int(opened.vertices[v]), float(opened.delta[d]))
         pose = np.array(motion["pose"])
         assert motion["t"][0] == run.t[0] and motion["t"][-1] == pytest.approx(run.t[-1], rel=1e-5)
@@ -174,25 +184,8 @@ def test_motion_is_that_of_the_replicate(real):
         )
         shown = motion["shown"]
         assert motion["t"][shown] == pytest.approx(run.row["t_collision"], rel=1e-2)
-        lengths = {len(motion[key]) for key in ("t", "eye", "pose", "dot", "contacts", "words")}
+        lengths = {
+            len(motion[key]) for key in ("t", "eye", "pose", "distance", "contacts", "words")
+        }
         assert lengths == {len(motion["t"])}
         assert f"d_c = {1e6 * run.row['d_c_last']:.4g} µm" in motion["words"][-1]
-
-
-def test_a_browser_shows_the_page_and_moves_it(real, tmp_path):
-    from PIL import Image
-
-    browser()
-    _, file = real
-    dom, said, picture = open_page(file, tmp_path, height=5000)
-    assert not said
-    assert "d_c = " in re.search("<output>(.*?)</output>", dom)[1]
-    colours = Image.open(picture).convert("RGB").getcolors(2**24)
-    assert len(colours) > 100 and max(colours)[0] < 0.98 * 1200 * 5000
-    press = "<script>document.querySelector('.motion button').click()</script></body>"
-    page = file.read_text("utf-8").replace("</body>", press)
-    (tmp_path / "played.html").write_text(page, "utf-8")
-    moved, said, _ = open_page(tmp_path / "played.html", tmp_path)
-    assert not said and "Pause" in moved
-    place = "<output>(.*?)</output>"
-    assert re.search(place, moved)[1] != re.search(place, dom)[1]

@@ -19,21 +19,23 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Allowed, Sources
 from flocsim.ensembles.contents import Example, stored_in
 from flocsim.ensembles.diagnose.spheres import water_facts
-from flocsim.ensembles.kind import study_of
+from flocsim.ensembles.kind import flocs_of, study_of
 from flocsim.ensembles.pairs.results import CONTENTS
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study, says_outcome
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.fields import is_whole
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.plots.results import FIGURES
-from flocsim.io.plots.style import Figure, add_foot, save
-from flocsim.io.results.file import FORMAT, first_of_each, read_results
+from flocsim.io.plots.style import CLASS_WORDS, Figure, add_foot, save
+from flocsim.io.results.file import FORMAT, instructive_of_each, read_results
 from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.run_group import source_line
-from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS
+from flocsim.io.results.schema import FLAGS, GROUPS
 from flocsim.run import Run
+from flocsim.trajectories.figures import motion_data
 from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory
 
@@ -267,17 +269,26 @@ class StudyResults(Tables):
 
 
 def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
-    """Return the first replicate of each class that the file has, of its flocs with the most
-    vertices."""
+    """Return a replicate of each class that the file has, chosen by `instructive_of_each`."""
     opened, found = StudyResults(path, allowed), []
-    first = first_of_each(opened.results)
-    for outcome in filter(first.__contains__, CLASSES):
-        t, v, d, k = first[outcome]
+    for outcome, ((t, v, d, k), why) in instructive_of_each(opened.results).items():
         name, vertices, delta = opened.types[t], int(opened.vertices[v]), float(opened.delta[d])
-        title = f"type {name}, N = {vertices}, δ = {delta:g} δ_max, replicate {k}"
+        heading = CLASS_WORDS[outcome]
+        at = "" if opened.kernel else f"δ = {delta:g}, "
+        title = f"Type {name}, N = {vertices}, {at}replicate {k}: {why}."
         try:
-            run: Any = opened.replicate(k, name, vertices, delta)
-            found.append(Example(outcome, title, run, run.row["D_0"]))
+            run = opened.replicate(k, name, vertices, delta)
+            found.append(Example(heading, title, motion_data(run)))
         except FlocsimError as error:
-            found.append(Example(outcome, title, reason=" ".join(str(error).split())))
+            found.append(Example(heading, title, reason=" ".join(str(error).split())))
     return found
+
+
+def outlines_of(path: str | os.PathLike, allowed: Allowed) -> dict[str, Shape]:
+    """Return the flocs that the study of a file draws from, by name; none where its config cannot
+    be used here."""
+    try:
+        flocs = flocs_of(StudyResults(path, allowed).config)
+    except FlocsimError:
+        return {}
+    return {floc.name: floc.shapes[max(floc.shapes)] for floc in flocs}

@@ -7,6 +7,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from flocsim.ensembles import report
 from flocsim.ensembles.config.sources import Allowed
 from flocsim.ensembles.contents import (
@@ -99,10 +101,20 @@ def swept_table(table: Labelled) -> tuple[Sequence[str], Row]:
     return ("n", *ends, "Pr[A] [low, high]"), row
 
 
+ON_EXAMPLES = (
+    "One pair of each class, run again from the seed and seen from the receiving floc: of those "
+    "with the most vertices the one whose time from touch to decision is nearest to the upper "
+    "quartile, long enough to see what happens in contact and no exception. Frames are spaced by "
+    "distance, not by time. Red rings mark contacts."
+)
+
+
 class PairFiles(Contents):
     """What becomes of the rows of a study of pairs or rates; what commands show of its files."""
 
     title = "results of a collision ensemble"
+    on_examples = ON_EXAMPLES
+    first = ("outcomes", "delta", "bonds", "kernels", "efficiency")
     file = schema.RESULTS
     compared = schema.COMPARED
     swept = ("probabilities", "pooled")
@@ -116,7 +128,8 @@ class PairFiles(Contents):
     opened = later("ensembles.pairs.opened", "StudyResults")
     compare = later("ensembles.pairs.comparison", "compare")
     examples = later("ensembles.pairs.opened", "examples_of")
-    answer = later("ensembles.pairs.answer", "answer_sentence")
+    outlines = later("ensembles.pairs.opened", "outlines_of")
+    pairs_answer = later("ensembles.pairs.answer", "answer_sentence")
     setting = later("ensembles.pairs.answer", "setting_sentence")
     verdict = staticmethod(report.verdict)
     read = staticmethod(read_results)
@@ -147,6 +160,29 @@ class PairFiles(Contents):
         return "\n".join(filter(None, [*lines, report.outlines_line(results)]))
 
     detailed = table
+
+    def answer(self, found: schema.Results) -> str:
+        """Return what a study of pairs, or of rates, found in one sentence."""
+        kernel = found.kernel
+        if kernel is None:
+            return self.pairs_answer(found)
+        most, words = kernel.vertices.argmax(), []
+        for mechanism, alpha in zip(kernel.mechanisms, kernel.arrays["alpha"], strict=True):
+            if np.isfinite(alpha[most]).any():
+                least, largest = 100.0 * np.nanmin(alpha[most]), 100.0 * np.nanmax(alpha[most])
+                words.append(f"{least:.0f} to {largest:.0f} % by {mechanism}")
+        which = f"N = {kernel.vertices[most]}, over all sizes"
+        return f"Of pairs that touch, these stick ({which}): {', '.join(words) or 'unknown'}."
+
+    def rows(self, results: schema.Results) -> list[list[str]]:
+        """Return the table of every condition as cells; of rates there is the text."""
+        if results.kernel is not None:
+            return []
+        columns = report.columns_of(results, numerics_matter(results), every=False)
+        return [["type", *columns]] + [
+            [results.types[at[0]], *(cell(at) for cell in columns.values())]
+            for at in np.ndindex(results.shape)
+        ]
 
     def running(self, found: Any) -> Facts:
         """Return the conditions of a study of pairs that still runs."""

@@ -17,6 +17,7 @@ from flocsim.ensembles.contents import (
     MEANINGS,
     Contents,
     Differences,
+    Example,
     Facts,
     Figures,
     Row,
@@ -34,6 +35,12 @@ from flocsim.io.results import swarm_file
 from flocsim.io.results.run_group import stored
 from flocsim.io.results.swarm_file import SwarmResults
 from flocsim.io.terminal import in_words
+
+ON_EXAMPLES = (
+    "Each cluster of two or more flocs has a colour; single flocs are grey. "
+    "Between snapshots, positions are interpolated. Along the sides on which the box repeats "
+    "itself, the view moves with the flocs."
+)
 
 # What is saved of a replicate while it runs.
 
@@ -142,7 +149,7 @@ def facts_of(results: SwarmResults) -> Facts:
     events = results.groups["events"]
     before, after = events["event_before"], events["event_after"]
     return [
-        ("swarms", f"{len(radii)} of {plural(np.count_nonzero(free), 'body', 'bodies')}, "
+        ("swarms", f"{len(radii)} of {plural(int(free.sum()), 'body', 'bodies')}, "
          f"{int(ends['finished'].sum())} completed"),
         ("r_eq [um]", f"{radii.min():.4g} to {radii.max():.4g}, median {np.median(radii):.4g}"),
         ("box [um]", f"{width:.5g} x {height:.5g}"),
@@ -220,8 +227,11 @@ class SwarmFiles(Contents):
 
     title = "results of a swarm study"
     file = swarm_file.SWARMS
+    rows = staticmethod(swarm_file.rows_of)
     table = staticmethod(swarm_file.table_of)
     compared = {name: words for name, (_, _, words) in swarm_file.COUNTS.items()}  # noqa: RUF012
+    on_examples = ON_EXAMPLES
+    first = ("snapshots", "clusters", "sizes")
     swept = ("counts",)
     swept_table = staticmethod(swept_table)
     dry_run = later("ensembles.swarms.study", "dry_run")
@@ -282,6 +292,22 @@ class SwarmFiles(Contents):
     def summary(self, results: SwarmResults) -> Summary:
         """Return what a results file of swarms says of its study."""
         return study_summary(facts_of(results), results.run, note_words)
+
+    def answer(self, found: SwarmResults) -> str:
+        """Return what the bodies have become by the end, means over swarms."""
+        counts, (many, bodies) = found.groups["counts"], found.groups["bodies"]["floc"].shape
+        clusters, size = (swarm_file.mean(counts[name])[-1] for name in ("clusters", "mean_size"))
+        over, time = f" (means over {many} swarms)" * (many > 1), found.scales["time"][-1]
+        return (
+            f"After {time:g} s, {bodies} flocs form {clusters:.3g} clusters; a floc is, on "
+            f"average, in a cluster of {size:.2g}{over}."
+        )
+
+    def examples(self, path: Any, allowed: Any) -> list[Example]:
+        """Return the motion of the first swarm, by its snapshots."""
+        from flocsim.io.plots.swarm import motion_data
+
+        return [Example("First swarm", "", motion_data(self.read(path)))]
 
     def running(self, found: Any) -> Facts:
         """Return facts of swarms that still run."""

@@ -324,6 +324,13 @@ def rings_path(rings):
     return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in ends))
 
 
+def svg_path(rings: Sequence[np.ndarray]) -> str:
+    """Return rings (k, 2) [m] as the path of an SVG [µm]."""
+    return " ".join(
+        "M" + " ".join(f"{u:.5g},{v:.5g}" for u, v in style.MICRO * ring) + "Z" for ring in rings
+    )
+
+
 def frame_axes(axes, centre, half):
     """A square window without numbers; the scale bar gives the size."""
     (left, right), (low, high) = ((each - half, each + half) for each in centre)

@@ -6,6 +6,7 @@ A figure is a function of SwarmResults, and stands in SWARM_FIGURES under the na
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from flocsim.geometry.shapes.cores import PointTable, parts_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from flocsim.io.files import Rule
-from flocsim.io.plots.collision import rings_path
+from flocsim.io.plots.collision import rings_path, svg_path
 from flocsim.io.plots.style import (
     MICRO,
     Figure,
@@ -24,12 +25,12 @@ from flocsim.io.plots.style import (
     save_gif,
     set_log_axis,
 )
-from flocsim.io.results.swarm_file import GONE, POINTS, RINGS, SwarmResults, mean
+from flocsim.io.results.swarm_file import GONE, POINTS, RINGS, WALL, SwarmResults, mean
 
 MOST_POINTS = 160
 """Points of an outline that is drawn: arcs finer than a picture of many bodies shows are left."""
 
-ALONE, FIXED = "0.78", "0.35"
+ALONE, FIXED = "#c7c7c7", "#595959"
 """Colours of bodies that belong to no cluster of two or more, and of walls."""
 
 BOND_COLOURS = (
@@ -43,6 +44,9 @@ SNAPSHOTS = 4
 
 MILLISECONDS = 120
 """Of every frame of an animation."""
+
+MOST_MOMENTS, BETWEEN = 120, 12
+"""Snapshots of a motion on a page, and frames from one to the next."""
 
 
 def snapshots(results: SwarmResults) -> Figure:
@@ -205,14 +209,16 @@ def outlines_of(results: SwarmResults, replicate: int) -> list[list[np.ndarray]]
     return found
 
 
-def cluster_colours(labels: np.ndarray) -> list:
+def cluster_colours(labels: np.ndarray) -> list[str]:
     """A colour for every body: that of its cluster, which follows from its first body."""
     import matplotlib
+    from matplotlib.colors import to_hex
 
-    palette = matplotlib.colormaps["tab20"]
+    tab20 = matplotlib.colormaps["tab20"]
+    palette = [to_hex(tab20(place)) for place in range(20)]
     _, first, place, size = np.unique(labels, True, True, True)
     return [
-        FIXED if label < 0 else (palette(first[own] % 20) if size[own] > 1 else ALONE)
+        FIXED if label < 0 else (palette[first[own] % 20] if size[own] > 1 else ALONE)
         for label, own in zip(labels, place, strict=True)
     ]
 
@@ -270,6 +276,34 @@ def write_swarm_animation(
             figure.canvas.draw()
             pictures.append(frame_of(figure))
     save_gif(path, pictures, MILLISECONDS, rule)
+
+
+def motion_data(results: SwarmResults) -> dict[str, Any]:
+    """Return what the script of a page needs to show the first swarm at its snapshots.
+
+    Lengths in µm. The view moves with the bodies along the sides on which the box repeats itself:
+    their settling would hide how they move against each other.
+    """
+    chosen, bodies, moments = places_shown(results, MOST_MOMENTS), *(
+        results.groups[name] for name in ("bodies", "snapshots")
+    )  # fmt: skip
+    box, free = MICRO * bodies["box"][0], bodies["floc"][0] != WALL
+    repeats = box * [axis in str(results.run.get("periodic", "xy")) for axis in "xy"]
+    pose = moments["position"][0, chosen] * [MICRO, MICRO, np.degrees(1.0)]
+    moved = np.nanmean(pose[:, free, :2] - pose[0, free, :2], axis=1)
+    pose[:, free, :2] -= (moved * (repeats > 0.0))[:, np.newaxis]
+    times = results.scales["time"][chosen]
+    count, largest = (results.groups["counts"][name][0, chosen] for name in ("clusters", "largest"))
+    return {
+        "paths": [svg_path(rings) for rings in outlines_of(results, 0)],
+        "fixed": (~free).tolist(), "box": box.tolist(), "repeats": repeats.tolist(),
+        "pose": [[body if np.isfinite(body[0]) else None for body in each]
+                 for each in np.round(pose, 3).tolist()],
+        "colour": [cluster_colours(each) for each in moments["cluster"][0, chosen]],
+        "t": times.tolist(), "shown": len(times) - 1, "between": BETWEEN,
+        "words": [f"t = {time:.3g} s: {n:.0f} clusters, largest {most:.0f}"
+                  for time, n, most in zip(times, count, largest, strict=True)],
+    }  # fmt: skip
 
 
 SWARM_FIGURES: dict[str, Callable[[SwarmResults], Figure]] = {

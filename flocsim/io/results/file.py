@@ -16,9 +16,9 @@ from flocsim.io.groups import Dataset, File, Unfit
 from flocsim.io.labelled import Labelled
 from flocsim.io.results.kernel_group import kernel_in
 from flocsim.io.results.schema import (
+    CLASSES,
     FLOCS,
     GROUPS,
-    OUTCOMES,
     REPLICATES,
     RESULTS,
     Results,
@@ -123,16 +123,26 @@ def failures_of(file: File) -> list[str]:
     return words.split()
 
 
-def first_of_each(results: Results) -> dict[str, tuple[int, int, int, int]]:
-    """Return {outcome: place (type, vertices, delta, replicate)} of its first replicate, if any.
+def instructive_of_each(results: Results) -> dict[str, tuple[tuple[int, int, int, int], str]]:
+    """Return {class: (place (type, vertices, delta, replicate), why)} of a replicate to watch.
 
-    Conditions of the most vertices come first: of an outcome the most detailed flocs are found.
+    Of the flocs with the most vertices of the class, the one whose time from touch to decision is
+    nearest to the upper quartile: what happens in contact shows, and is not exceptional.
     """
     assert results.replicates is not None
-    order = np.argsort(-results.vertices, kind="stable")
-    codes = np.moveaxis(results.replicates["outcome"][:, order], 1, 0)
+    codes = np.asarray(results.replicates["outcome"])
+    times = np.asarray(results.replicates["t_end"]) - results.replicates["t_collision"]
     found = {}
-    for code, first in zip(*np.unique(codes, return_index=True), strict=True):
-        v, t, d, row = map(int, np.unravel_index(first, codes.shape))
-        found[OUTCOMES[code]] = (t, int(order[v]), d, row)
+    for code, name in enumerate(CLASSES):
+        of_class = (codes == code) & np.isfinite(times)
+        if not of_class.any():
+            continue
+        most = results.vertices[of_class.any(axis=(0, 2, 3))].max()
+        of_class &= (results.vertices == most)[:, np.newaxis, np.newaxis]
+        wanted = np.quantile(times[of_class], 0.75)
+        distances = np.where(of_class, np.abs(times - wanted), np.inf)
+        t, v, d, row = map(int, np.unravel_index(distances.argmin(), distances.shape))
+        time, many = 1e3 * times[t, v, d, row], np.count_nonzero(of_class)
+        why = f"{time:.3g} ms from touch to decision, chosen from {many} pairs"
+        found[name] = (t, v, d, row), why
     return found

@@ -20,7 +20,7 @@ import numpy as np
 from flocsim.io.groups import FileFormat, Group, Stored, declared
 from flocsim.io.json_text import read_json
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
-from flocsim.io.terminal import table_along
+from flocsim.io.terminal import aligned, rows_along
 
 STATUS = ("opened", "opens_at_least_rate", "holds_at_most_rate", "failed")
 """Words of the codes of ``status``: between two rates; at the lowest rate already; at none; a run
@@ -157,4 +157,4 @@ def table_of(found: Strengths) -> str:
 
     axes = {name: found.table(name) for name in AXES}
     places = map(tuple, np.argwhere(found.table("n_bound")).tolist())
-    return table_along(axes, heads, row, places, left=1)
+    return "\n".join(aligned(rows_along(axes, heads, row, places), left=1))

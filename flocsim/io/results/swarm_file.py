@@ -226,7 +226,13 @@ def events_between(before: np.ndarray, after: np.ndarray) -> list[tuple[int, ...
 
 def table_of(found: SwarmResults) -> str:
     """Return numbers on the clusters over time, means over replicates, as text."""
-    counts, many = found.groups["counts"], len(found.scales["replicate"])
+    many = len(found.scales["replicate"])
+    return "\n".join(aligned(rows_of(found)) + [f"means over {many} swarms"] * (many > 1))
+
+
+def rows_of(found: SwarmResults) -> list[list[str]]:
+    """Return heads, and numbers on the clusters at each time, means over replicates."""
+    counts = found.groups["counts"]
     columns = {
         "time [s]": (found.scales["time"], "{:.4g}"),
         "clusters": (mean(counts["clusters"]), "{:.1f}"),
@@ -235,11 +241,11 @@ def table_of(found: SwarmResults) -> str:
         "percolating": (mean(counts["percolating"]), "{:.1f}"),
         "R_g [um]": (1e6 * mean(counts["gyration"]), "{:.3g}"),
         "porosity": (mean(counts["porosity"]), "{:.3f}"),
-        "held": (mean(counts["bonds_certificate"]), "{:.1f}"),
+        "certificates": (mean(counts["bonds_certificate"]), "{:.1f}"),
         "hooks": (mean(counts["bonds_hook"]), "{:.1f}"),
         "settling [mm/s]": (1e3 * mean(counts["settling"]), "{:.4g}"),
         "median position error [m]": (mean(counts["median_error"]), "{:.1e}"),
         "largest [m]": (mean(counts["error"]), "{:.1e}"),
     }
     rows = zip(*(map(form.format, values) for values, form in columns.values()), strict=True)
-    return "\n".join(aligned([[*columns], *rows]) + [f"means over {many} swarms"] * (many > 1))
+    return [[*columns], *map(list, rows)]
