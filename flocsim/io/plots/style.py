@@ -27,25 +27,44 @@ MICRO = 1e6
 LAST = 1500
 """Milliseconds for which an animation shows its last frame."""
 
+WIDTH = 3.4
+"""Inches, a column of a journal: every figure is so wide, and has no letters below SMALL points, so
+that they have 6 points where it is 8 cm wide."""
+SMALL = 6.5
+
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
-    "font.size": 8.0,
-    "axes.titlesize": 9.0,
+    "font.size": 7.0,
+    "axes.titlesize": 7.0,
     "axes.titlelocation": "left",
+    "axes.titlepad": 4.0,
+    "axes.labelpad": 2.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.linewidth": 0.7,
+    "axes.linewidth": 0.6,
     "axes.edgecolor": "0.35",
     "axes.axisbelow": True,
     "xtick.color": "0.25",
     "ytick.color": "0.25",
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "xtick.major.pad": 2.0,
+    "ytick.major.pad": 2.0,
     "legend.frameon": False,
-    "lines.linewidth": 1.2,
-    "lines.markersize": 4.0,
+    "legend.fontsize": SMALL,
+    "legend.title_fontsize": SMALL,
+    "legend.handlelength": 1.8,
+    "legend.columnspacing": 1.2,
+    "legend.labelspacing": 0.3,
+    "legend.handletextpad": 0.5,
+    "lines.linewidth": 1.0,
+    "lines.markersize": 3.2,
     "figure.dpi": 100.0,
-    "savefig.dpi": 200.0,
+    "savefig.dpi": 400.0,
     "pdf.fonttype": 42,
     # Without a fixed salt every SVG gets random names inside.
     "svg.hashsalt": "flocsim",
@@ -57,7 +76,7 @@ BOND_COLOURS = {"certificate": "#009E73", "hook": "#CC79A7", "rest": "#999999"}
 BODY_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
 CONTACT_COLOUR = "#D7191C"
 MARKERS = "osD^vPX*"
-MOST_LABELS = 8
+MOST_LABELS = 6
 """More labels of vertex counts than this would run into each other."""
 WIDE = 5.0
 """Ends of a logarithmic axis that differ by so much have two of 1, 2 and 5 of a decade between."""
@@ -71,11 +90,10 @@ MOST_LETTERS = 40
 """Of a name or a word of a label, a legend or a panel's title."""
 MOST_OF_TITLE = 300
 """Letters of a title that has the whole figure's width, and is broken."""
-LEGEND_ROWS = 9
-FOOT_HEIGHT = 0.13
-"""Inches of the line at the foot of a figure."""
-LEGEND_ROOM, MOST_GROWTH = 2.0, 30.0
-"""Inches that a legend may take of a figure, and by which a figure grows at most for it."""
+FOOT_HEIGHT = 0.115
+"""Inches of a line at the foot of a figure."""
+LETTERS_PER_INCH = 20
+"""Of a line at the foot."""
 CROWDED = 50
 """Points in a panel from which on markers and lines are drawn finer."""
 
@@ -207,20 +225,25 @@ def wrap(text, room):
 def mark_figure(figure: Figure, words: str) -> None:
     """Say something of the whole figure, in red above it: that its results are unfinished."""
     before = f"\n{figure._suptitle.get_text()}" if figure._suptitle else ""
-    figure.suptitle(words + before, x=0.01, ha="left", fontsize=9, color=CONTACT_COLOUR)
+    figure.suptitle(words + before, x=0.01, ha="left", fontsize=7, color=CONTACT_COLOUR)
 
 
 def add_foot(figure: Figure, words: str) -> None:
-    """Name the source of what a figure shows, small, at its foot, for which it grows."""
-    above = f"{figure._supxlabel.get_text()}\n" if figure._supxlabel else ""
-    words = plain(words, MOST_OF_TITLE)
-    if not words or words in " ".join(above.split()):
+    """Add lines at the foot of a figure, small: notes on what is drawn; last of all its source.
+
+    The figure grows by them.
+    """
+    above = figure._supxlabel.get_text().split("\n") if figure._supxlabel else []
+    most = int(LETTERS_PER_INCH * figure.get_figwidth())
+    lines = textwrap.wrap(plain(words, MOST_OF_TITLE), most)
+    if not lines or lines == above[-len(lines) :]:
         return
-    figure.set_figheight(figure.get_figheight() + FOOT_HEIGHT)
+    figure.set_figheight(figure.get_figheight() + FOOT_HEIGHT * len(lines))
+    lines = above + lines
     with house_style():
-        figure.supxlabel(above + words, x=0.01, ha="left", fontsize=6, color="0.4")
-    for legend in figure.legends:  # below all panels, and above the line
-        low = FOOT_HEIGHT / figure.get_figheight()
+        figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize=SMALL, color="0.3")
+    for legend in figure.legends:  # below all panels, and above the lines
+        low = FOOT_HEIGHT * len(lines) / figure.get_figheight()
         legend.set_bbox_to_anchor((0.0, low, 1.0, 1.0 - low), figure.transSubfigure)
 
 
@@ -279,7 +302,7 @@ def set_share_axis(axes):
 
 def set_probability_axis(axes):
     axes.set_ylim(-0.03, 1.03)
-    axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], labels=["0", "0.25", "0.5", "0.75", "1"])
+    axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], labels=["0", "", "0.5", "", "1"])
     axes.grid(axis="y", color="0.9", linewidth=0.6)
 
 
@@ -309,33 +332,56 @@ def note(axes, words):
     axes.text(0.5, 0.5, words, color="0.4", ha="center", va="center", transform=axes.transAxes)
 
 
-def add_line_legend(axes, words, colours, title):
-    """A legend of lines by their words."""
+def line_handles(words, colours):
+    """Handles of a legend of lines by their words."""
     from matplotlib.lines import Line2D
 
-    handles = [
+    return [
         Line2D([], [], color=colour, marker=marker(index), label=word)
         for index, (word, colour) in enumerate(zip(words, colours, strict=False))
     ]
-    place_legend(axes, handles, title)
 
 
-def place_legend(axes, handles, title):
-    """A legend beside a panel. The figure grows by what it is wider than the room beside panels:
-    else long words, or many columns, would leave none to these."""
-    legend = axes.legend(
-        handles=handles,
-        title=title,
-        loc="upper left",
-        bbox_to_anchor=(1.02, 1.0),
-        borderaxespad=0.0,
-        ncols=-(-len(handles) // LEGEND_ROWS),
-        alignment="left",
-    )
-    figure = axes.figure
-    more = legend.get_window_extent().width / figure.dpi - LEGEND_ROOM
-    if more > 0.0:
-        figure.set_figwidth(figure.get_figwidth() + min(more, MOST_GROWTH))
+def place_legend(figure, groups, spare=None):
+    """A legend of {title: handles}: each group a column, or a single one in as many columns as fit.
+
+    It stands in ``spare``, a place of the grid without a panel, or below all panels, for which the
+    figure grows.
+    """
+    if len(groups) == 1:
+        [(title, handles)] = groups.items()
+        widest = range(len(handles), 0, -1)
+    else:
+        title, handles, widest = "", side_by_side(groups), [len(groups)]
+    look = {"handles": handles, "title": title, "alignment": "left"}
+    if spare is not None:
+        spare.set_axis_off()
+        spare.legend(loc="upper left", borderaxespad=0.0, **look)
+        return
+    for columns in widest:
+        legend = figure.legend(ncols=columns, **look)
+        box = legend.get_window_extent()
+        legend.remove()
+        if box.width <= figure.bbox.width:
+            break
+    rows = -(-len(handles) // columns)  # as few columns as these rows need
+    figure.legend(loc="outside lower center", ncols=-(-len(handles) // rows), **look)
+    figure.set_figheight(figure.get_figheight() + box.height / figure.dpi)
+
+
+def side_by_side(groups):
+    """Handles of {title: handles}, each group filled up to the longest, its title above it."""
+    from matplotlib.lines import Line2D
+
+    def words(text):
+        return Line2D([], [], linestyle="none", label=text)
+
+    most = max(map(len, groups.values()))
+    columns = [
+        [words(title), *handles, *[words(" ")] * (most - len(handles))]
+        for title, handles in groups.items()
+    ]
+    return [handle for column in columns for handle in column]
 
 
 def marker(index):
