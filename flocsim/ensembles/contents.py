@@ -88,6 +88,8 @@ class Contents:
     """Groups of results that sweeps join, the first being printed; none: they cannot be run."""
     swept_table: Any = None
     """(that group, Labelled) → (heads, row) of `table_along` at the values of the swept keys."""
+    drawn: Sequence[str] = ()
+    """Figures that `flocsim plot` draws where none is named; none: all."""
     compare: Any = None
     """(opened, opened) → Tables of differences, whose ``table(name)`` is text."""
     animate: Any = None
@@ -115,8 +117,12 @@ class Contents:
         return {}
 
     def source(self, found: Any) -> str:
-        """Return of which flocs, preset and version it is, in a line."""
-        return source_line(found.run)
+        """Return of which preset, flocs, replicates and version it is, in a line."""
+        return source_line(found.run, self.counts(found))
+
+    def counts(self, found: Any) -> Sequence[int]:
+        """Return the numbers of replicates of all conditions, or of swarms; () if not known."""
+        return ()
 
     def mark(self, found: Any) -> str:
         """Return what each figure has to say, as that it is not complete; "" for nothing."""

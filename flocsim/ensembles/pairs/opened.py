@@ -20,6 +20,7 @@ from flocsim.ensembles.config.sources import Allowed, Sources
 from flocsim.ensembles.contents import Example, stored_in
 from flocsim.ensembles.diagnose.spheres import water_facts
 from flocsim.ensembles.kind import study_of
+from flocsim.ensembles.pairs.results import CONTENTS
 from flocsim.ensembles.report import checked_line, format_table
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study, says_outcome
@@ -31,7 +32,6 @@ from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import Figure, add_foot, save
 from flocsim.io.results.file import FORMAT, first_of_each, read_results
 from flocsim.io.results.kernel_group import KERNEL_GROUP
-from flocsim.io.results.run_group import source_line
 from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS
 from flocsim.run import Run
 from flocsim.trajectories.replay import Origin
@@ -203,7 +203,7 @@ class StudyResults(Tables):
         if figure not in FIGURES:
             raise UsageError(f"figure must be one of {', '.join(FIGURES)}, found {figure!r}")
         drawn = FIGURES[figure](self.results)
-        add_foot(drawn, source_line(self.run))
+        add_foot(drawn, CONTENTS.source(self.results))
         if file is not None:
             save(drawn, Path(file), overwrite)
         return drawn

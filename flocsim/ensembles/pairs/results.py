@@ -105,6 +105,7 @@ class PairFiles(Contents):
     file = schema.RESULTS
     compared = schema.COMPARED
     swept = ("probabilities", "pooled")
+    drawn = ("outcomes", "overview", "4", "5", "6", "8")
     swept_table = staticmethod(swept_table)
     results = later("ensembles.pairs.study", "results")
     old_rows = later("ensembles.pairs.study", "old_rows")
@@ -155,6 +156,11 @@ class PairFiles(Contents):
             ("numerical error",
              report.checked_line(results) or "unknown: no replicate was run again yet"),
         ]  # fmt: skip
+
+    def counts(self, found: schema.Results) -> Sequence[int]:
+        """Return the numbers of replicates of all conditions."""
+        numbers: list[int] = found.probabilities["n_total"].ravel().tolist()
+        return numbers
 
     def figures(self, found: schema.Results) -> Figures:
         """Return the figures of pairs, or of rates."""

@@ -19,7 +19,7 @@ from flocsim.io.results.numerics import numerics_matter
 from flocsim.io.results.schema import SHAPE_MEASURES, Results
 
 COLOURS = {
-    "aggregated": "#0072B2", "departed": "#56B4E9", "missed": "0.85", "held": "#009E73",
+    "aggregated": "#0072B2", "departed": "#56B4E9", "missed": "0.8", "held": "#009E73",
     "undecided": "#E69F00", "failed": "#D7191C",
 }  # fmt: skip
 """Of the ends of replicates, in the order of the stack."""
@@ -108,8 +108,8 @@ def words_of(marked: set[str]) -> str:
 def bars_of(results: Any, numerics: bool) -> str:
     """What the bars of a figure mean, for the foot; with ``numerics`` drawn, and why."""
     added = ["numerical error"] * numerics + ["error of the outlines"] * has_bands(results)
-    thin = f"; thin: with the {' and the '.join(added)}" if added else ""
-    large = ", in some condition over half as large" * (numerics and numerics_matter(results))
+    thin = f"; thin: plus {' and '.join(added)}" if added else ""
+    large = " (large in some condition)" * (numerics and numerics_matter(results))
     return f"Bars: 95 % sampling intervals{thin}{large}."
 
 
@@ -133,11 +133,11 @@ def end_handles(counts: Mapping[str, np.ndarray]) -> list[Any]:
     return [Patch(facecolor=COLOURS[word], label=word) for word in there]
 
 
-def draw_probability(axes, results, number, name, numerics):
+def draw_probability(axes, results, number, name, numerics, most=style.MOST_LABELS):
     """The lines of a type, for each delta; the causes of what has no value."""
     causes, marked = causes_of(results.probabilities, name)[number], set()
     bands = [band[number] for band in bands_of(results, name, numerics)]
-    style.set_vertex_axis(axes, results.vertices)
+    style.set_vertex_axis(axes, results.vertices, most)
     style.set_probability_axis(axes)
     count, few = results.delta.size, trials_of(results, name)[number] < FEW
     for index, colour in enumerate(style.graded_colours(count)[:count]):
@@ -153,10 +153,10 @@ def trials_of(results, name):
     return events_of(results.probabilities)[name].trials
 
 
-def draw_shares(axes, results, number, name, numerics):
+def draw_shares(axes, results, number, name, numerics, most=style.MOST_LABELS):
     """The classes or kinds of bond of one type, counts pooled over delta."""
     bands = share_bands(results, number, name, numerics)
-    style.set_vertex_axis(axes, results.vertices)
+    style.set_vertex_axis(axes, results.vertices, most)
     style.set_probability_axis(axes)
     colours = SHARES[name][-1].values()
     for index, colour in enumerate(colours):
@@ -276,7 +276,7 @@ PAIR_MEASURES = {
     "aspect_ratio": "mean\naspect ratio",
     "circularity": "mean\ncircularity",
     "solidity": "mean\nsolidity",
-    "size_ratio": "size ratio,\nsmaller over larger",
+    "size_ratio": "size\nratio",
 }
 """What is said of the shapes of two flocs: of both the mean, of their radii the ratio."""
 
@@ -382,6 +382,7 @@ def shape_effects(results: Results) -> Figure:
             for axes in row:
                 style.set_probability_axis(axes)
                 axes.locator_params(axis="x", nbins=2)
+                axes.xaxis.set_major_formatter("{x:g}")
             row[0].set_ylabel(title)
             if not rows:
                 style.note(row[0], "only for\nfinished\nstudies")

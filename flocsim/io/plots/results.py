@@ -21,6 +21,8 @@ from flocsim.io.results.schema import Results
 
 PANELS_PER_ROW = 2
 PANEL_HEIGHT = 1.35
+NARROW = 4
+"""Labels of vertex counts that fit a panel of three beside each other."""
 HOLLOW = f" Hollow: n < {ends.FEW}."
 DELTA_LABEL = r"displacement $\delta\,/\,\delta_{\max}$"
 LABELS = {
@@ -86,9 +88,9 @@ def overview(results: Results, numerics: bool = False) -> Figure:
         grid = figure.subplots(len(rows), count, sharex=True, sharey=True, squeeze=False)
         for number in range(count):
             for axes, name in zip(grid[:2, number], rows[:2], strict=True):
-                marked |= ends.draw_probability(axes, results, number, name, numerics)
+                marked |= ends.draw_probability(axes, results, number, name, numerics, NARROW)
             for axes, name in zip(grid[2:, number], ends.SHARES, strict=True):
-                ends.draw_shares(axes, results, number, name, numerics)
+                ends.draw_shares(axes, results, number, name, numerics, NARROW)
             grid[0, number].set_title(titles[number])
             grid[-1, number].set_xlabel("vertices $N$")
         for axes, name in zip(grid[:, 0], rows, strict=True):
@@ -111,7 +113,7 @@ def against_delta(results: Results, numerics: bool = False) -> Figure:
         found = ends.bands_of(results, "pr_a", numerics)
         for number, axes in enumerate(panels):
             style.set_probability_axis(axes)
-            axes.set_xlim(-0.05, 1.05)
+            axes.set(xlim=(-0.05, 1.05), xticks=[0.0, 0.5, 1.0])
             if places[-1] == 1.0:
                 axes.axvline(1.0, color="0.85", zorder=0)
             for index, colour in enumerate(colours[: len(results.vertices)]):

@@ -187,7 +187,7 @@ def keep_titles_whole(figure: Figure) -> None:
         title.set_visible(True)
     panels = [(axes, axes.get_window_extent()) for axes in figure.axes if axes.get_visible()]
     added = dict.fromkeys([box.y1 for _, box in panels], 0.0)
-    for text in filter(None, [figure._suptitle, figure._supxlabel]):
+    for text in filter(None, [figure._suptitle]):
         more = wrap(text, width - text.get_window_extent().x0 - 4.0)
         added[math.inf] = added.get(math.inf, 0.0) + more
     for axes, box in panels:
@@ -240,11 +240,18 @@ def add_foot(figure: Figure, words: str) -> None:
         return
     figure.set_figheight(figure.get_figheight() + FOOT_HEIGHT * len(lines))
     lines = above + lines
+    low = (FOOT_HEIGHT * len(lines) + 0.04) / figure.get_figheight()
     with house_style():
-        figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize=SMALL, color="0.3")
-    for legend in figure.legends:  # below all panels, and above the lines
-        low = FOOT_HEIGHT * len(lines) / figure.get_figheight()
+        foot = figure.supxlabel("\n".join(lines), x=0.01, y=0.2 * low / len(lines), ha="left",
+                                va="bottom", fontsize=SMALL, color="0.3")  # fmt: skip
+    # The layout would take the larger of a legend's and a label's height, not their sum.
+    foot.set_in_layout(False)
+    taken = low
+    for legend in figure.legends:
+        taken += legend.get_window_extent().height / figure.bbox.height
         legend.set_bbox_to_anchor((0.0, low, 1.0, 1.0 - low), figure.transSubfigure)
+    if figure.get_layout_engine() is not None:
+        figure.get_layout_engine().set(rect=(0.0, taken, 1.0, 1.0 - taken))
 
 
 def graded_colours(count):
@@ -278,14 +285,14 @@ def vertex_positions(vertices):
     return np.searchsorted(np.unique(vertices), vertices).astype(float)
 
 
-def set_vertex_axis(axes, vertices):
+def set_vertex_axis(axes, vertices, most=MOST_LABELS):
     """Ticks at the vertex counts, N = 1 called "sphere".
 
-    Labels are thinned until none touch; the first and last always show.
+    Labels are thinned to the ``most`` that fit; the first and last always show.
     """
     counts = np.unique(vertices)
     words = ["sphere" if count == 1 else str(count) for count in counts]
-    every = -(-len(words) // MOST_LABELS)
+    every = -(-len(words) // most)
     for index in range(1, len(words)):
         if (len(words) - 1 - index) % every or index < every:
             words[index] = ""
@@ -355,6 +362,7 @@ def place_legend(figure, groups, spare=None):
         title, handles, widest = "", side_by_side(groups), [len(groups)]
     look = {"handles": handles, "title": title, "alignment": "left"}
     if spare is not None:
+        spare.set_visible(True)
         spare.set_axis_off()
         spare.legend(loc="upper left", borderaxespad=0.0, **look)
         return

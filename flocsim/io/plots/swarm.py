@@ -281,7 +281,8 @@ def write_swarm_animation(
         with drawing(4.0, min(max(4.0 * height / width, 2.0), 8.0) + 0.3) as figure:
             axes = figure.subplots()
             draw_bodies(axes, results, replicate, place, outlines)
-            axes.set(xlabel="x [µm]", ylabel="y [µm]", title=f"{results.scales['time'][place]:.4g} s")
+            time = results.scales["time"][place]
+            axes.set(xlabel="x [µm]", ylabel="y [µm]", title=f"{time:.4g} s")
             figure.canvas.draw()
             pictures.append(frame_of(figure))
     save_gif(path, pictures, MILLISECONDS, rule)
