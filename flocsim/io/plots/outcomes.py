@@ -109,7 +109,7 @@ def bars_of(results: Any, numerics: bool) -> str:
     """What the bars of a figure mean, for the foot; with ``numerics`` drawn, and why."""
     added = ["numerical error"] * numerics + ["error of the outlines"] * has_bands(results)
     thin = f"; thin: plus {' and '.join(added)}" if added else ""
-    large = " (large in some condition)" * (numerics and numerics_matter(results))
+    large = " (large somewhere)" * (numerics and numerics_matter(results))
     return f"Bars: 95 % sampling intervals{thin}{large}."
 
 

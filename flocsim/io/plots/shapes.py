@@ -108,11 +108,9 @@ def shape(entries: Sequence[ShapeEntry]) -> Figure:
             values = np.array([getattr(each, name) for each in found])
             axes.hist(values, bins=bins_of(values, values.min()), **BARS)
             middle = np.median(values)
-            axes.axvline(middle, color="0.25", linestyle="--", label=f"median {middle:.3g}")
-            room = 1.2 * axes.get_ylim()[1]  # for the legend above the bars
-            axes.set(xlabel=label, ylabel="number of flocs", ylim=(0.0, room))
+            axes.axvline(middle, color="0.25", linestyle="--")
+            axes.set(xlabel=label, ylabel="number of flocs", title=f"median {middle:.3g}")
             axes.yaxis.get_major_locator().set_params(integer=True)
-            axes.legend()
         draw_dimension(panels[3], areas, perimeters)
         return figure
 
@@ -121,16 +119,16 @@ def draw_dimension(axes, areas, perimeters):
     """Perimeter against area, a disc's, and the line of D_f2."""
     axes.plot(areas, perimeters, "o", color="#0072B2", ms=2.5)
     ends = np.array([areas.min(), areas.max()])
-    axes.plot(ends, 2.0 * np.sqrt(np.pi * ends), color="0.6", linewidth=0.8, label="disc")
+    axes.plot(ends, 2.0 * np.sqrt(np.pi * ends), color="0.5", linestyle="--", label="disc")
     if (found := perimeter_dimension(areas, perimeters)) is not None:
         slope, error = found
         middle = np.exp(np.log(perimeters).mean() - 0.5 * slope * np.log(areas).mean())
-        label = f"$D_{{f2}}$ = {slope:.2f} ± {error:.2f}"
-        axes.plot(ends, middle * ends ** (0.5 * slope), color="#D55E00", label=label)
+        axes.plot(ends, middle * ends ** (0.5 * slope), color="#D55E00")
+        axes.set_title(f"$D_{{f2}}$ = {slope:.2f} ± {error:.2f}")
     axes.set(xscale="log", yscale="log", xlabel="area [µm²]", ylabel="perimeter [µm]")
     style.set_log_axis(axes.xaxis)
     style.set_log_axis(axes.yaxis)
-    axes.legend()
+    axes.legend(loc="lower right")
 
 
 def figure_3(entries: Sequence[ShapeEntry]) -> Figure:

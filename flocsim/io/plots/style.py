@@ -57,6 +57,8 @@ STYLE: dict[str, Any] = {
     "legend.frameon": False,
     "legend.fontsize": SMALL,
     "legend.title_fontsize": SMALL,
+    "legend.borderpad": 0.2,
+    "legend.borderaxespad": 0.2,
     "legend.handlelength": 1.8,
     "legend.columnspacing": 1.2,
     "legend.labelspacing": 0.3,
@@ -80,7 +82,7 @@ MOST_LABELS = 6
 """More labels of vertex counts than this would run into each other."""
 WIDE = 5.0
 """Ends of a logarithmic axis that differ by so much have two of 1, 2 and 5 of a decade between."""
-LONG = 1000.0
+LONG = 30.0
 """Ends from which on labels at 2 and 5 would touch."""
 PLAIN = (1e-3, 2e5)
 """Numbers that are written out."""
@@ -92,8 +94,6 @@ MOST_OF_TITLE = 300
 """Letters of a title that has the whole figure's width, and is broken."""
 FOOT_HEIGHT = 0.115
 """Inches of a line at the foot of a figure."""
-LETTERS_PER_INCH = 20
-"""Of a line at the foot."""
 CROWDED = 50
 """Points in a panel from which on markers and lines are drawn finer."""
 
@@ -233,17 +233,19 @@ def add_foot(figure: Figure, words: str) -> None:
 
     The figure grows by them.
     """
-    above = figure._supxlabel.get_text().split("\n") if figure._supxlabel else []
-    most = int(LETTERS_PER_INCH * figure.get_figwidth())
-    lines = textwrap.wrap(plain(words, MOST_OF_TITLE), most)
-    if not lines or lines == above[-len(lines) :]:
+    above = f"{figure._supxlabel.get_text()}\n" if figure._supxlabel else ""
+    words = plain(words, MOST_OF_TITLE)
+    if not words or words in " ".join(above.split()):
         return
-    figure.set_figheight(figure.get_figheight() + FOOT_HEIGHT * len(lines))
-    lines = above + lines
-    low = (FOOT_HEIGHT * len(lines) + 0.04) / figure.get_figheight()
     with house_style():
-        foot = figure.supxlabel("\n".join(lines), x=0.01, y=0.2 * low / len(lines), ha="left",
-                                va="bottom", fontsize=SMALL, color="0.3")  # fmt: skip
+        foot = figure.supxlabel(above + words, x=0.01, ha="left", va="bottom", fontsize=SMALL,
+                                color="0.3")  # fmt: skip
+    wrap(foot, figure.bbox.width)
+    before, after = (1 + text.count("\n") for text in (above, foot.get_text()))
+    added = after - before + (not above)
+    figure.set_figheight(figure.get_figheight() + FOOT_HEIGHT * added)
+    low = (FOOT_HEIGHT * after + 0.04) / figure.get_figheight()
+    foot.set_y(0.02 / figure.get_figheight())
     # The layout would take the larger of a legend's and a label's height, not their sum.
     foot.set_in_layout(False)
     taken = low
@@ -359,8 +361,8 @@ def place_legend(figure, groups, spare=None):
         [(title, handles)] = groups.items()
         widest = range(len(handles), 0, -1)
     else:
-        title, handles, widest = "", side_by_side(groups), [len(groups)]
-    look = {"handles": handles, "title": title, "alignment": "left"}
+        title, handles, widest = None, side_by_side(groups), [len(groups)]
+    look = {"handles": handles, "title": title or None, "alignment": "left"}
     if spare is not None:
         spare.set_visible(True)
         spare.set_axis_off()
