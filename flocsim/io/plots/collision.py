@@ -272,17 +272,22 @@ def draw_zone(axes, zone_distance):
     axes.set_ylim(low, high)
     axes.axhspan(low, level, color=INSIDE_COLOUR, zorder=0)
     axes.axhline(level, color="0.35", linestyle=(0, (4, 2)), linewidth=0.9)
-    # Where fewer points of the panel's first line lie above the zone's.
+    # Where the fewest points of the panel's first line lie: to the left or right, above or below.
     x, y = (np.asarray(values, dtype=float) for values in axes.lines[0].get_data())
-    crowded = x[(y >= level) & (y <= level + margin)]
-    side = "left" if np.sum(crowded > x.mean()) > np.sum(crowded <= x.mean()) else "right"
+    left, above = x < x.mean(), y >= level
+    crowded = {
+        (side, up): np.sum((left == (side == "left")) & (above == up) & (abs(y - level) <= margin))
+        for up in (True, False) for side in ("right", "left")
+    }  # fmt: skip
+    side, up = min(crowded, key=crowded.__getitem__)
     axes.annotate(
         f"$D_0$ = {level:.4g} µm",
         (0.0 if side == "left" else 1.0, level),
         xycoords=("axes fraction", "data"),
-        xytext=(2 if side == "left" else -2, 2),
+        xytext=(2 if side == "left" else -2, 2 if up else -2),
         textcoords="offset points",
         ha=side,
+        va="bottom" if up else "top",
         color="0.25",
         bbox=PALE,
     )
