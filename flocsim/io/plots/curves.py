@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.io.plots import outcomes, style
-from flocsim.io.plots.results import LABELS, panel_grid, panel_width
+from flocsim.io.plots.results import LABELS
 from flocsim.io.plots.style import MICRO, WIDTH, Figure, drawing, plain
 from flocsim.io.results.events import ENDS_COUNTED
 from flocsim.io.results.numerics import numerics_matter
@@ -123,7 +123,7 @@ def set_key_axis(axes, swept, places, count):
     margin = MARGIN * (np.ptp(at) / max(len(at) - 1, 1) or 0.1 * abs(at[0]) or 1.0)
     ends = at[0] - margin, at[-1] + margin
     axes.set_xlim(*(np.exp(ends) if steep else ends))
-    points = (at - ends[0]) / (ends[1] - ends[0]) * 72.0 * panel_width(count)
+    points = (at - ends[0]) / (ends[1] - ends[0]) * 72.0 * style.panel_width(count)
     axes.xaxis.set_major_locator(FixedLocator(places))
     axes.xaxis.set_minor_locator(NullLocator())
     if swept.words:
@@ -203,7 +203,7 @@ def by_ratio(results: Results, name: str, label: str) -> Figure:
     kernel = results.kernel
     assert kernel is not None, "a figure of a kernel study"
     titles = list(map(plain, kernel.mechanisms))
-    with panel_grid(titles, label, "$r$ of smaller / larger") as (figure, panels, spare):
+    with style.panel_grid(titles, label, "$r$ of smaller / larger") as (figure, panels, spare):
         # Places of the larger classes whose lines are drawn: no more than can be told apart.
         count = len(kernel.labels)
         places = np.linspace(min(1, count - 1), count - 1, min(MOST_LINES, count))
@@ -280,7 +280,7 @@ def over_rate(found: Strengths) -> Figure:
     types, vertices = found.table("type"), found.table("vertices")
     x_label = f"$G$ of the {plain(found.about.get('flow'))} [1/s]"
     titles = style.type_titles(types)
-    with panel_grid(titles, "share of bonds opened", x_label) as (figure, panels, spare):
+    with style.panel_grid(titles, "share of bonds opened", x_label) as (figure, panels, spare):
         colours = style.graded_colours(len(vertices))
         for number, axes in enumerate(panels):
             any_opened = 0

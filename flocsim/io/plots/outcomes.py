@@ -107,15 +107,11 @@ def words_of(marked: set[str]) -> str:
 
 def bars_of(results: Any, numerics: bool) -> str:
     """What the bars of a figure mean, for the foot; with ``numerics`` drawn, and why."""
-    added = ["numerical error"] * numerics + ["error of the outlines"] * has_bands(results)
+    outlines = bool(getattr(results, "outlines", {}))  # a sweep has none
+    added = ["numerical error"] * numerics + ["error of the outlines"] * outlines
     thin = f"; thin: plus {' and '.join(added)}" if added else ""
     large = " (large somewhere)" * (numerics and numerics_matter(results))
     return f"Bars: 95 % sampling intervals{thin}{large}."
-
-
-def has_bands(results: Any) -> bool:
-    """Return True if outlines were cut closer and wider, too."""
-    return bool(getattr(results, "outlines", {}))
 
 
 def shifted(axes: Any, points: float) -> Any:

@@ -5,12 +5,10 @@ FIGURES at the end, under the name that `flocsim plot` gives it; the first line 
 the command's help.
 """
 
-import contextlib
 from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.io.confidence import efficiency
 from flocsim.io.plots import outcomes as ends
 from flocsim.io.plots import style
 from flocsim.io.plots.outcomes import shape_effects
@@ -19,11 +17,9 @@ from flocsim.io.results.events import ENDS_COUNTED
 from flocsim.io.results.numerics import numerics_matter
 from flocsim.io.results.schema import Results
 
-PANELS_PER_ROW = 2
-PANEL_HEIGHT = 1.35
 NARROW = 4
 """Labels of vertex counts that fit a panel of three beside each other."""
-HOLLOW = f" Hollow: n < {ends.FEW}."
+HOLLOW = f" Hollow: fewer than {ends.FEW}."
 DELTA_LABEL = r"displacement $\delta\,/\,\delta_{\max}$"
 LABELS = {
     "pr_inside": r"$\Pr[C(d_c<D_0)]$",
@@ -56,7 +52,7 @@ def probability_figure(results, name, numerics):
     """One panel per type, one line per delta, against N."""
     numerics, marked = numerics or numerics_matter(results), set()
     titles = style.type_titles(results.types)
-    with panel_grid(titles, LABELS[name]) as (figure, panels, spare):
+    with style.panel_grid(titles, LABELS[name]) as (figure, panels, spare):
         for number, axes in enumerate(panels):
             marked |= ends.draw_probability(axes, results, number, name, numerics)
         style.place_legend(figure, delta_legend(results), spare)
@@ -71,7 +67,7 @@ def figure_8(results: Results, numerics: bool = False) -> Figure:
     """
     numerics = numerics or numerics_matter(results)
     titles = style.type_titles(results.types)
-    with panel_grid(titles, LABELS["classes"]) as (figure, panels, spare):
+    with style.panel_grid(titles, LABELS["classes"]) as (figure, panels, spare):
         for number, axes in enumerate(panels):
             ends.draw_shares(axes, results, number, "classes", numerics)
         style.place_legend(figure, shares_legend("classes"), spare)
@@ -105,7 +101,7 @@ def against_delta(results: Results, numerics: bool = False) -> Figure:
     """Pr[A] against delta: a panel for each type, a line for each number of vertices."""
     numerics, marked = numerics or numerics_matter(results), set()
     titles = style.type_titles(results.types)
-    with panel_grid(titles, LABELS["pr_a"], DELTA_LABEL) as (figure, panels, spare):
+    with style.panel_grid(titles, LABELS["pr_a"], DELTA_LABEL) as (figure, panels, spare):
         colours = style.graded_colours(len(results.vertices))
         order = np.argsort(results.delta)
         places = results.delta[order]
@@ -135,11 +131,11 @@ def against_delta(results: Results, numerics: bool = False) -> Figure:
 def outcomes(results: Results) -> Figure:
     """What becomes of replicates, stacked to 1: panels by type, N on the axis, a bar each delta."""
     titles = style.type_titles(results.types)
-    with panel_grid(titles, "share of replicates") as (figure, panels, spare):
+    with style.panel_grid(titles, "share of replicates") as (figure, panels, spare):
         count = results.delta.size
         order = np.argsort(results.vertices)
         places = style.vertex_positions(results.vertices)[order]
-        slot = 72.0 * panel_width(len(titles)) / len(places)
+        slot = 72.0 * style.panel_width(len(titles)) / len(places)
         for number, axes in enumerate(panels):
             style.set_vertex_axis(axes, results.vertices)
             style.set_share_axis(axes)
@@ -161,33 +157,6 @@ def deltas_of(results):
     return ", ".join(shares) + " (grazes)" * (shares[-1] == "1")
 
 
-def efficiencies(results: Results) -> Figure:
-    """Efficiency: the probability of aggregation integrated over delta, in the plane and axially.
-
-    docs/results.md has the formula; bars: the sums of the 95 % bounds at each delta.
-    """
-    titles = style.type_titles(results.types)
-    with panel_grid(titles, "efficiency $E$") as (figure, panels, spare):
-        words = [
-            r"plane, $\int_0^1 P\,d\delta$", r"axial, $\int_0^1 P\,2\delta\,d\delta$"
-        ]  # fmt: skip
-        colours = [style.CLASS_COLOURS["A"], style.CLASS_COLOURS["C"]]
-        for number, axes in enumerate(panels):
-            style.set_vertex_axis(axes, results.vertices)
-            style.set_probability_axis(axes)
-            for index, axial in enumerate((False, True)):
-                found = efficiency(results.probabilities, results.delta, axial)
-                if found is None:
-                    style.note(axes, "delta does not\nspan 0 to 1")
-                    break
-                bands = [*(each[number] for each in found), *np.zeros((2, len(results.vertices)))]
-                ends.draw_line(axes, results.vertices, bands, index, 2, colours[index])
-        legend = {"aggregations per approach": style.line_handles(words, colours)}
-        style.place_legend(figure, legend, spare)
-        style.add_foot(figure, ends.bars_of(results, False))
-        return figure
-
-
 def against_size(results: Results, numerics: bool = False) -> Figure:
     """Pr[A], all displacements pooled, against the approaching floc's size; a panel for each N.
 
@@ -200,7 +169,7 @@ def against_size(results: Results, numerics: bool = False) -> Figure:
     receivers = np.unique(r_i[known].round(9))
     titles = ["sphere" if count == 1 else f"$N$ = {count}" for count in results.vertices]
     x_label = "approaching $r_j$ [µm]"
-    with panel_grid(titles, LABELS["pr_a"], x_label) as (figure, panels, spare):
+    with style.panel_grid(titles, LABELS["pr_a"], x_label) as (figure, panels, spare):
         if not (known.any() and results.pooled):
             for axes in panels:
                 style.set_probability_axis(axes)
@@ -231,32 +200,6 @@ def room_for(sizes):
     return low / margin, high * margin
 
 
-@contextlib.contextmanager
-def panel_grid(titles, y_label, x_label="vertices $N$"):
-    """(a figure with equal panels of these titles, two a row, the panels, and a place of the grid
-    that has none, or None)."""
-    count = len(titles)
-    columns = min(count, PANELS_PER_ROW)
-    rows = -(-count // columns)
-    with drawing(WIDTH, PANEL_HEIGHT * rows + 0.2) as figure:
-        grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-        for axes in grid[count:]:
-            axes.set_visible(False)
-        for axes in grid[max(count - columns, 0) : count]:
-            axes.xaxis.set_tick_params(labelbottom=True)
-            axes.set_xlabel(x_label)
-        for axes, title in zip(grid, titles, strict=False):
-            axes.set_title(title)
-        for axes in grid[:count:PANELS_PER_ROW]:
-            axes.set_ylabel(y_label)
-        yield figure, list(grid[:count]), grid[-1] if len(grid) > count else None
-
-
-def panel_width(count):
-    """Inches that the axis of each of ``count`` panels has, about."""
-    return (WIDTH - 0.3) / min(count, PANELS_PER_ROW) - 0.15
-
-
 def delta_legend(results):
     """{title: handles} of the lines of displacements."""
     words = [f"{share:g}" + (" (grazes)" if share == 1.0 else "") for share in results.delta]
@@ -281,7 +224,6 @@ FIGURES: dict[str, Callable[[Results], Figure]] = {
     "6": figure_6,
     "8": figure_8,
     "delta": against_delta,
-    "efficiency": efficiencies,
     "outcomes": outcomes,
     "overview": overview,
     "shape": shape_effects,

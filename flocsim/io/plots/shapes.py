@@ -79,9 +79,9 @@ def sizes(entries: Sequence[ShapeEntry]) -> Figure:
     found = np.array([2e6 * entry.measured_radius for entry in one_each(entries)])
     bins = bins_of(found, 0.0)
     top = 0.0
-    with drawing(style.WIDTH, 2.0) as figure:
-        panels = figure.subplots(1, 2, sharex=True, sharey=True)
-        for axes, word, by_volume in zip(panels, ("number", "volume"), (False, True), strict=True):
+    titles, x_label = ("by number", "by volume"), "diameter $2r_\\mathrm{eq}$ [µm]"
+    with style.panel_grid(titles, "share", x_label, 1.8) as (figure, panels, _):
+        for axes, by_volume in zip(panels, (False, True), strict=True):
             weights = found**3 if by_volume else np.ones(found.size)
             bars, _, _ = axes.hist(found, bins=bins, weights=weights / weights.sum(), **BARS)
             top = max(top, bars.max())
@@ -89,10 +89,9 @@ def sizes(entries: Sequence[ShapeEntry]) -> Figure:
             for value, share, dashes in marks:
                 label = f"D{100 * share:.0f} = {value:.3g} µm"
                 axes.axvline(value, ymax=BELOW_LEGEND, color="0.25", linestyle=dashes, label=label)
-            axes.set(title=f"by {word}", xlabel="diameter $2r_\\mathrm{eq}$ [µm]")
             axes.set_xlim(left=0.0)
             axes.legend(loc="upper left")
-        panels[0].set(ylabel="share", ylim=(0.0, top / BELOW_LEGEND))
+        panels[0].set(ylim=(0.0, top / BELOW_LEGEND))
         return figure
 
 
@@ -138,22 +137,12 @@ def figure_3(entries: Sequence[ShapeEntry]) -> Figure:
     (N = 1).  The classes part at r_eq = 5 px, the paper's 5 µm.
     """
     radii = sorted({entry.spheroradius for entry in entries})
-    columns = min(len(radii), 2)
-    rows = -(-len(radii) // columns)
-    with drawing(style.WIDTH, 1.5 * rows + 0.2) as figure:
-        panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-        for axes in panels[len(radii) :]:
-            axes.set_visible(False)
-        for radius, axes in zip(radii, panels, strict=False):
+    titles = [f"spheroradius r = {radius:g} px" for radius in radii]
+    with style.panel_grid(titles, "error RE [%]") as (figure, panels, spare):
+        for radius, axes in zip(radii, panels, strict=True):
             draw_errors(axes, [e for e in entries if e.spheroradius == radius])
-            axes.set(title=f"spheroradius r = {radius:g} px")
-        for axes in panels[max(len(radii) - columns, 0) : len(radii)]:
-            axes.set_xlabel("vertices $N$")
-            axes.xaxis.set_tick_params(labelbottom=True)
-        for axes in panels[::columns]:
-            axes.set_ylabel("error RE [%]")
         panels[0].set_ylim(bottom=0.0)
-        style.place_legend(figure, {"": panels[0].get_legend_handles_labels()[0]})
+        style.place_legend(figure, {"": panels[0].get_legend_handles_labels()[0]}, spare)
         style.add_foot(figure, "Mean ± standard deviation of the relative error; dashed: circle of "
                        "equal area.")  # fmt: skip
         return figure

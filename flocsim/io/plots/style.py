@@ -37,8 +37,6 @@ STYLE: dict[str, Any] = {
     "font.size": 7.0,
     "axes.titlesize": 7.0,
     "axes.titlelocation": "left",
-    "axes.titlepad": 4.0,
-    "axes.labelpad": 2.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.linewidth": 0.6,
@@ -50,19 +48,12 @@ STYLE: dict[str, Any] = {
     "ytick.labelsize": SMALL,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
-    "xtick.major.size": 2.5,
-    "ytick.major.size": 2.5,
-    "xtick.major.pad": 2.0,
-    "ytick.major.pad": 2.0,
     "legend.frameon": False,
     "legend.fontsize": SMALL,
     "legend.title_fontsize": SMALL,
     "legend.borderpad": 0.2,
     "legend.borderaxespad": 0.2,
-    "legend.handlelength": 1.8,
     "legend.columnspacing": 1.2,
-    "legend.labelspacing": 0.3,
-    "legend.handletextpad": 0.5,
     "lines.linewidth": 1.0,
     "lines.markersize": 3.2,
     "figure.dpi": 100.0,
@@ -92,6 +83,8 @@ MOST_LETTERS = 40
 """Of a name or a word of a label, a legend or a panel's title."""
 MOST_OF_TITLE = 300
 """Letters of a title that has the whole figure's width, and is broken."""
+PANELS_PER_ROW = 2
+PANEL_HEIGHT = 1.35
 FOOT_HEIGHT = 0.115
 """Inches of a line at the foot of a figure."""
 CROWDED = 50
@@ -169,6 +162,34 @@ def drawing(width: float, height: float) -> Iterator[Figure]:
     """An empty figure [inches], to be drawn in the house's style inside the block."""
     with house_style():
         yield new_figure(width, height)
+
+
+@contextlib.contextmanager
+def panel_grid(
+    titles: Sequence[str], y_label: str, x_label: str = "vertices $N$", height: float = PANEL_HEIGHT
+) -> Iterator[tuple[Figure, list[Any], Any]]:
+    """(a figure with equal panels of these titles, two a row, the panels, and a place of the grid
+    that has none, or None); ``height`` of a panel [inches]."""
+    count = len(titles)
+    columns = min(count, PANELS_PER_ROW)
+    rows = -(-count // columns)
+    with drawing(WIDTH, height * rows + 0.2) as figure:
+        grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+        for axes in grid[count:]:
+            axes.set_visible(False)
+        for axes in grid[max(count - columns, 0) : count]:
+            axes.xaxis.set_tick_params(labelbottom=True)
+            axes.set_xlabel(x_label)
+        for axes, title in zip(grid, titles, strict=False):
+            axes.set_title(title)
+        for axes in grid[:count:columns]:
+            axes.set_ylabel(y_label)
+        yield figure, list(grid[:count]), grid[-1] if len(grid) > count else None
+
+
+def panel_width(count: int) -> float:
+    """Inches that the axis of each of ``count`` panels has, about."""
+    return (WIDTH - 0.3) / min(count, PANELS_PER_ROW) - 0.15
 
 
 def keep_titles_whole(figure: Figure) -> None:

@@ -25,6 +25,7 @@ from flocsim.io.plots.style import (
     graded_colours,
     line_handles,
     marker,
+    panel_grid,
     place_legend,
     save_gif,
     set_log_axis,
@@ -55,19 +56,11 @@ def snapshots(results: SwarmResults) -> Figure:
     times = results.scales["time"]
     chosen = places_shown(results, SNAPSHOTS)
     width, height = results.groups["bodies"]["box"][0]
-    rows = -(-len(chosen) // 2)
-    tall = min(max(1.4 * height / width, 0.8), 3.0)
-    with drawing(WIDTH, (tall + 0.25) * rows + 0.25) as figure:
-        grid = figure.subplots(rows, 2, squeeze=False, sharex=True, sharey=True)
-        for axes, place in zip(grid.ravel(), chosen, strict=False):
+    titles = [f"{times[place]:.4g} s" for place in chosen]
+    tall = 0.25 + min(max(1.4 * height / width, 0.8), 3.0)
+    with panel_grid(titles, "y [µm]", "x [µm]", tall) as (figure, panels, _):
+        for axes, place in zip(panels, chosen, strict=True):
             draw_bodies(axes, results, 0, int(place))
-            axes.set_title(f"{times[place]:.4g} s")
-        for axes in grid.ravel()[len(chosen) :]:
-            axes.set_visible(False)
-        for axes in grid[:, 0]:
-            axes.set_ylabel("y [µm]")
-        for axes in grid[-1]:
-            axes.set_xlabel("x [µm]")
         return figure
 
 
