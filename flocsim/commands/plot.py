@@ -1,6 +1,7 @@
 """`flocsim plot`: the figures of a file."""
 
 import argparse
+import inspect
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,15 @@ from flocsim.io.plots.style import FORMATS, mark_figure, save
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Draw the figures of a file, each to its own file; figures with a number are those of Tang et
     al. (2014). Of a running study, the figures of the replicates so far are drawn, marked as
-    unfinished.
+    unfinished. Bars are 95 % sampling intervals; the numerical error is drawn as well where it is
+    more than half of them in some condition.
 
     results: file written by flocsim ensemble or flocsim fit
     --output-dir DIR: folder for the figures, created if missing (default: the current one)
     --format: default: %(default)s
-    --figures LIST: figures, separated by commas, as overview,4 (default: all that the file has)
+    --figures LIST: figures, separated by commas, as 4,5,6,8 or overview; all: all that the file has
+      (default: of pairs outcomes,overview,4,5,6,8, of others all)
+    --numerics: draw the numerical error in any case, as thin bars
     --animation FILE.gif: for a swarm study: also write its first swarm as an animation
     """
     add = parser.add_argument
@@ -30,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--output-dir", default=".")
     add("--format", default="png", choices=FORMATS)
     add("--figures")
+    add("--numerics", action="store_true")
     add("--animation")
     add_overwrite(parser)
 
@@ -38,9 +43,11 @@ def run(args: argparse.Namespace) -> int:
     """Draw the figures asked for, print the path of each; returns the exit code."""
     kind, content, remark, foot = read_content(args.results)
     figures = kind.figures(content)
-    names = list(figures)
-    if args.figures is not None:
+    names = [name for name in kind.drawn if name in figures] or list(figures)
+    if args.figures is not None and args.figures != "all":
         names = list(dict.fromkeys(map(str.strip, args.figures.split(","))))
+    elif args.figures == "all":
+        names = list(figures)
     foreign = [name for name in names if name not in figures]
     if foreign:
         raise UsageError(f"{args.results} has no figure {foreign[0]!r}, only {', '.join(figures)}")
@@ -54,7 +61,9 @@ def run(args: argparse.Namespace) -> int:
         check_ending(path, (".gif",))
     check_outputs((*paths.values(), *animation), rule, [args.results])
     for name, path in paths.items():
-        figure = figures[name](content)
+        draw = figures[name]
+        thin = args.numerics and "numerics" in inspect.signature(draw).parameters
+        figure = draw(content, numerics=True) if thin else draw(content)
         if remark:
             mark_figure(figure, remark)
         save(figure, path, rule, foot)

@@ -53,6 +53,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Test the bonds, write and print what was found, draw it; return the exit code."""
+    from flocsim.ensembles.strength.contents import CONTENTS
     from flocsim.ensembles.strength.survey import Survey, bound_doublets, gathered, in_words
     from flocsim.io.plots.curves import over_rate
     from flocsim.io.plots.style import save
@@ -107,8 +108,9 @@ def run(args: Namespace) -> int:
         print(f"flocsim: {who}: {kept}\n{continuing()}", file=sys.stderr)
         return STOPPED
     found = write(complete=True)
-    say(f"{table_of(found)}\n{source_line(found.about)}\n{output}")
-    save(over_rate(found), figure, drawn, source_line(found.about))
+    source = CONTENTS.source(found)
+    say(f"{table_of(found)}\n{source}\n{output}")
+    save(over_rate(found), figure, drawn, source)
     say(os.fspath(figure))
     return 0
 

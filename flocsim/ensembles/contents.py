@@ -93,6 +93,8 @@ class Contents:
     """(that group, Labelled) → (heads, row) of `rows_along` at the values of the swept keys."""
     detailed: Any = None
     """(found, whether to add numerical errors, whether all columns) → its numbers as text."""
+    drawn: Sequence[str] = ()
+    """Figures that `flocsim plot` draws where none is named; none: all."""
     compare: Any = None
     """(opened, opened) → Tables of differences, whose ``table(name)`` is text."""
     animate: Any = None
@@ -124,8 +126,12 @@ class Contents:
         return {}
 
     def source(self, found: Any) -> str:
-        """Return of which flocs, preset and version it is, in a line."""
-        return source_line(found.run)
+        """Return of which preset, flocs, replicates and version it is, in a line."""
+        return source_line(found.run, self.counts(found))
+
+    def counts(self, found: Any) -> Sequence[int]:
+        """Return the numbers of replicates of all conditions, or of swarms; () if not known."""
+        return ()
 
     def answer(self, found: Any) -> str:
         """Return what a study found, in one sentence; "" where there is none."""

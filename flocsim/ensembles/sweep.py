@@ -273,6 +273,14 @@ class SweepFiles(Contents):
         }  # fmt: skip
         return rows_along(axes, *kind.swept_table(table))
 
+    def counts(self, found: SweepResults) -> Sequence[int]:
+        """Return the numbers of replicates of all conditions, or of swarms of all values."""
+        table = found.labelled(next(iter(found.groups)))
+        if "n_total" not in table.columns:
+            return (len(table.axes["replicate"].values),)
+        numbers: list[int] = table.columns["n_total"].values.ravel().tolist()
+        return numbers
+
     def figures(self, found: SweepResults) -> Figures:
         """Return figures along a swept key."""
         from flocsim.io.plots.curves import SWEEP_FIGURES

@@ -13,7 +13,6 @@ import pytest
 from flocsim.commands import add_command
 from flocsim.ensembles.pairs.results import CONTENTS
 from flocsim.errors import FileError, UsageError
-from flocsim.io.plots import results as drawings
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.results.run_group import provenance
 from tests.helpers.results_files import write_results
@@ -45,18 +44,31 @@ def study(written, tmp_path):
     return shutil.copy(written, tmp_path / "study.h5")
 
 
-def test_all_figures_are_drawn_into_a_new_folder(study, monkeypatch, capsys, tmp_path):
-    few = {name: FIGURES[name] for name in ("4", "overview", "bonds")}
-    monkeypatch.setattr(drawings, "FIGURES", few)
-    study.unlink()
-    write_results(study, make_results(types=("I",), vertices=(1,), delta=(0.0,), count=8))
-    assert call("plot", study, "--output-dir", tmp_path / "a" / "b", "--format", "svg") == 0
+def test_figures_are_drawn_into_a_new_folder(study, capsys, tmp_path):
+    folder = tmp_path / "a" / "b"
+    assert (
+        call("plot", study, "--figures", "4,size", "--output-dir", folder, "--format", "svg") == 0
+    )
     printed = capsys.readouterr().out.split("\n")[:-1]
-    labels = [f"figure-{name}" if name.isdigit() else name for name in few]
-    names = [f"study-{label}.svg" for label in labels]
-    assert {"study-figure-4.svg", "study-overview.svg"} <= set(names)
-    assert printed == [str(tmp_path / "a" / "b" / name) for name in names]
-    assert sorted(os.listdir(tmp_path / "a" / "b")) == sorted(names)
+    names = ["study-figure-4.svg", "study-size.svg"]
+    assert printed == [str(folder / name) for name in names]
+    assert sorted(os.listdir(folder)) == names
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [((), ["outcomes", "overview", "4", "5", "6", "8"]), (("--figures", "all"), list(FIGURES))],
+)
+def test_the_default_set_is_what_the_help_says(words, names, capsys, in_tmp):
+    write_results("small.h5", make_results(types=("I",), vertices=(1,), delta=(0.0,), count=8))
+    assert call("plot", "small.h5", *words) == 0
+    labels = [f"figure-{name}" if name.isdigit() else name for name in names]
+    assert capsys.readouterr().out.split() == [f"small-{label}.png" for label in labels]
+    if not words:
+        with pytest.raises(SystemExit):
+            call("plot", "--help")
+        assert ",".join(names) in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -32,7 +32,6 @@ from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import CLASS_WORDS, Figure, add_foot, save
 from flocsim.io.results.file import FORMAT, instructive_of_each, read_results
 from flocsim.io.results.kernel_group import KERNEL_GROUP
-from flocsim.io.results.run_group import source_line
 from flocsim.io.results.schema import FLAGS, GROUPS
 from flocsim.run import Run
 from flocsim.trajectories.figures import motion_data
@@ -205,7 +204,7 @@ class StudyResults(Tables):
         if figure not in FIGURES:
             raise UsageError(f"figure must be one of {', '.join(FIGURES)}, found {figure!r}")
         drawn = FIGURES[figure](self.results)
-        add_foot(drawn, source_line(self.run))
+        add_foot(drawn, CONTENTS.source(self.results))
         if file is not None:
             save(drawn, Path(file), overwrite)
         return drawn

@@ -118,6 +118,7 @@ class PairFiles(Contents):
     file = schema.RESULTS
     compared = schema.COMPARED
     swept = ("probabilities", "pooled")
+    drawn = ("outcomes", "overview", "4", "5", "6", "8")
     swept_table = staticmethod(swept_table)
     results = later("ensembles.pairs.study", "results")
     old_rows = later("ensembles.pairs.study", "old_rows")
@@ -194,6 +195,11 @@ class PairFiles(Contents):
             ("replicates", f"{counts.min()} to {counts.max()} in each of {counts.size} conditions"
              f"{planned}"),
         ]  # fmt: skip
+
+    def counts(self, found: schema.Results) -> Sequence[int]:
+        """Return the numbers of replicates of all conditions."""
+        numbers: list[int] = found.probabilities["n_total"].ravel().tolist()
+        return numbers
 
     def figures(self, found: schema.Results) -> Figures:
         """Return the figures of pairs, or of rates."""

@@ -45,8 +45,8 @@ class StrengthFiles(Contents):
         return "" if found.complete else f"unfinished: {found.progress}"
 
     def source(self, found: Strengths) -> str:
-        """Return of which flocs, preset and version it is."""
-        return source_line(found.about)
+        """Return of which preset, flocs, bonds and version it is."""
+        return source_line(found.about, found.table("n_tested").ravel().tolist())
 
 
 CONTENTS = StrengthFiles()

@@ -313,6 +313,10 @@ class SwarmFiles(Contents):
         """Return facts of swarms that still run."""
         return facts_of(found.results)[:-1]
 
+    def counts(self, found: SwarmResults) -> Sequence[int]:
+        """Return the number of swarms."""
+        return (len(found.groups["ends"]["finished"]),)
+
     def figures(self, found: SwarmResults) -> Figures:
         """Return the figures that swarms have."""
         from flocsim.io.plots.swarm import SWARM_FIGURES

@@ -11,20 +11,22 @@ import numpy as np
 
 from flocsim.io.files import Rule
 from flocsim.io.plots import style
-from flocsim.io.plots.style import CONTACT_COLOUR, MICRO, Figure, drawing, plain
+from flocsim.io.plots.style import CONTACT_COLOUR, MICRO, WIDTH, Figure, drawing, plain
 
 INSIDE_COLOUR = "#DCEBF5"
 PALE = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
 """Behind text that lines may cross."""
 
 RING: dict[str, Any] = {
-    "marker": "o", "linestyle": "none", "markersize": 6, "markerfacecolor": "none",
-    "markeredgecolor": CONTACT_COLOUR, "markeredgewidth": 1.2,
+    "marker": "o", "linestyle": "none", "markersize": 5, "markerfacecolor": "none",
+    "markeredgecolor": CONTACT_COLOUR, "markeredgewidth": 1.0,
 }  # fmt: skip
 """Of a contact point."""
 
 PATH: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (3, 1.5))}
 """Of the way of a body's centre."""
+
+FRAMES_PER_ROW = 4
 
 GRID = 24
 """Points along a side at which a place for a name is looked for."""
@@ -69,23 +71,27 @@ def draw_strip(frames: Frames, title: str = "", zone_distance: float = math.nan)
     names = ["i", "j"] if bodies == 2 else [str(number) for number in range(bodies)]
     centres, half = windows(frames.outlines)
     unit, factor = time_unit(frames.times)
-    with drawing(1.65 * count + 0.1, (2.4 if title else 2.15) + 0.3) as figure:
-        row = figure.subplots(1, count, squeeze=False)[0]
-        for number, axes in enumerate(row):
+    rows = -(-count // FRAMES_PER_ROW)
+    columns = -(-count // rows)
+    with drawing(WIDTH, (WIDTH / columns + 0.3) * rows + 0.15 * bool(title)) as figure:
+        grid = figure.subplots(rows, columns, squeeze=False).ravel()
+        for axes in grid[count:]:
+            axes.set_visible(False)
+        for number, axes in enumerate(grid[:count]):
             draw_frame(axes, frames.paths, frames.outlines[number], frames.contacts[number])
             frame_axes(axes, centres[number], half)
-            time = f"{frames.times[number] * factor:.4g} {unit}"
-            axes.set_title(time, loc="center", fontsize=8)
+            axes.set_title(f"{frames.times[number] * factor:.4g} {unit}", loc="center")
             if bodies == 2:
                 distance = frames.centre_distance[number]
                 side = r" $<D_0$" if distance < zone_distance else r" $\geq D_0$"
                 side = side if math.isfinite(zone_distance) else ""
-                axes.set_xlabel(f"$d_c$ = {distance * MICRO:.1f} µm{side}")
-        draw_scale_bar(row[0], centres[0], half)
-        name_bodies(row[0], frames.outlines[0], names)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
-        figure.legend(handles=strip_keys(names), loc="outside lower left",
-                      ncols=len(names) + 2 if count > 3 else 2)  # fmt: skip
+                axes.set_xlabel(f"{distance * MICRO:.1f} µm{side}", fontsize=style.SMALL)
+        draw_scale_bar(grid[0], centres[0], half)
+        name_bodies(grid[0], frames.outlines[0], names)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=7) if title else None
+        style.place_legend(figure, {"": strip_keys(names)})
+        told = "Above frames: time; below: distance $d_c$ of the centres."
+        style.add_foot(figure, told.replace("$d_c$", "d_c") if bodies == 2 else "")
         style.keep_titles_whole(figure)
         return figure
 
@@ -94,7 +100,7 @@ def name_bodies(axes, frame, names):
     """Each body's name where it is widest, clear of the path drawn there."""
     from matplotlib.patheffects import withStroke
 
-    look = {"ha": "center", "va": "center", "fontsize": 9, "weight": "bold", "zorder": 7}
+    look = {"ha": "center", "va": "center", "fontsize": 8, "weight": "bold", "zorder": 7}
     look["path_effects"] = [withStroke(linewidth=3.0, foreground="white")]
     for number, (body, name) in enumerate(zip(frame, names, strict=True)):
         colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
@@ -128,18 +134,18 @@ def strip_keys(names):
         Patch(facecolor=(colour, 0.3), edgecolor=colour, label=f"body {name}")
         for colour, name in zip(style.BODY_COLOURS, names, strict=False)
     ]
-    seen = f", seen from {names[0]}" if len(names) > 1 else ""
-    way = Line2D([], [], color="0.4", label=f"path of a body's centre, whole run{seen}", **PATH)
+    seen = f" seen from {names[0]}" if len(names) > 1 else ""
+    way = Line2D([], [], color="0.4", label=f"path of the centre{seen}", **PATH)
     return [*keys, way, Line2D([], [], **RING, label="contact")]
 
 
 @contextlib.contextmanager
 def over_time(
-    times: Sequence[float], label: str, title: str, width: float, height: float
+    times: Sequence[float], label: str, title: str
 ) -> Iterator[tuple[Any, np.ndarray, float]]:
     """(axes of a new figure, times (k,) in a unit that suits them, that unit per second)."""
     unit, factor = time_unit(times)
-    with drawing(width, height) as figure:
+    with drawing(WIDTH, 2.0) as figure:
         axes = figure.subplots()
         axes.set(xlabel=f"time [{unit}]", ylabel=label, title=title)
         yield axes, np.asarray(times) * factor, factor
@@ -154,7 +160,7 @@ def draw_distance(
 
     ``times`` (k,) [s], ``centre_distance`` (k,) [m], ``zone_distance`` [m], NaN for none.
     """
-    with over_time(times, "centre distance $d_c$ [µm]", title, 3.6, 2.3) as (axes, time, _):
+    with over_time(times, "centre distance $d_c$ [µm]", title) as (axes, time, _):
         axes.plot(time, np.asarray(centre_distance) * MICRO, color=style.BODY_COLOURS[0])
         axes.margins(x=0.02, y=0.12)
         draw_zone(axes, zone_distance)
@@ -171,8 +177,8 @@ def draw_forces(
     time of the first touch, NaN for none.
     """
     curves = {plain(name): np.asarray(force) * NANO for name, force in forces.items()}
-    label = "force on the line of centres [nN]"
-    with over_time(times, label, title, 5.4, 2.6) as (axes, time, factor):
+    label = "force along the centres [nN]"
+    with over_time(times, label, title) as (axes, time, factor):
         for name, force, look in styled(curves):
             axes.plot(time, np.where(force > 0.0, force, np.nan), label=name, **look)
             pull = np.where(force < 0.0, -force, np.nan)
@@ -183,8 +189,8 @@ def draw_forces(
         if (largest := largest_of(curves)) > 0.0:
             axes.set_yscale("log")
             axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)
-        words = "pushes —   pulls - -"
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title=words, alignment="left")
+        groups = {"pushes —   pulls - -": axes.get_legend_handles_labels()[0]}
+        style.place_legend(axes.figure, groups)
     return axes.figure
 
 
@@ -200,14 +206,14 @@ def draw_energies(
     """
     curves = {f"work of {plain(name)}": np.asarray(each) * FEMTO for name, each in work.items()}
     curves["kinetic energy"] = np.asarray(kinetic) * FEMTO
-    with over_time(times, "energy [fJ]", title, 5.4, 2.6) as (axes, time, _):
+    with over_time(times, "energy [fJ]", title) as (axes, time, _):
         for name, each, look in styled(curves):
             axes.plot(time, each, label=name, **look)
         axes.axhline(0.0, color="0.8", linewidth=0.6, zorder=0)
         if (largest := largest_of(curves)) > 0.0:
             least = math.ceil(math.log10(largest)) - ENERGY_DECADES
             axes.set_yscale("symlog", linthresh=10.0**least)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+        style.place_legend(axes.figure, {"": axes.get_legend_handles_labels()[0]})
     return axes.figure
 
 
@@ -249,7 +255,7 @@ def write_animation(
             graph.plot(time, distance, "o", color=style.BODY_COLOURS[0])
             graph.set(xlabel=f"time [{unit}]", ylabel="centre distance $d_c$ [µm]")
             draw_zone(graph, zone_distance)
-            figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
+            figure.suptitle(title, x=0.01, ha="left", fontsize=7) if title else None
             style.keep_titles_whole(figure)  # which draws it
             pictures.append(style.frame_of(figure))
     style.save_gif(path, pictures, MILLISECONDS, rule)
@@ -266,17 +272,22 @@ def draw_zone(axes, zone_distance):
     axes.set_ylim(low, high)
     axes.axhspan(low, level, color=INSIDE_COLOUR, zorder=0)
     axes.axhline(level, color="0.35", linestyle=(0, (4, 2)), linewidth=0.9)
-    # Where fewer points of the panel's first line lie above the zone's.
+    # Where the fewest points of the panel's first line lie: to the left or right, above or below.
     x, y = (np.asarray(values, dtype=float) for values in axes.lines[0].get_data())
-    crowded = x[(y >= level) & (y <= level + margin)]
-    side = "left" if np.sum(crowded > x.mean()) > np.sum(crowded <= x.mean()) else "right"
+    left, above = x < x.mean(), y >= level
+    crowded = {
+        (side, up): np.sum((left == (side == "left")) & (above == up) & (abs(y - level) <= margin))
+        for up in (True, False) for side in ("right", "left")
+    }  # fmt: skip
+    side, up = min(crowded, key=crowded.__getitem__)
     axes.annotate(
         f"$D_0$ = {level:.4g} µm",
         (0.0 if side == "left" else 1.0, level),
         xycoords=("axes fraction", "data"),
-        xytext=(2 if side == "left" else -2, 2),
+        xytext=(2 if side == "left" else -2, 2 if up else -2),
         textcoords="offset points",
         ha=side,
+        va="bottom" if up else "top",
         color="0.25",
         bbox=PALE,
     )
@@ -345,7 +356,9 @@ def draw_scale_bar(axes, centre, half):
     left, level = centre[0] - 0.92 * half, centre[1] - 0.92 * half
     axes.plot([left, left + length], [level, level], color="0.1", linewidth=2.0, zorder=6)
     text = f"{length * MICRO:g} µm"
-    axes.text(left, level + 0.04 * half, text, va="bottom", fontsize=7, zorder=6, bbox=PALE)
+    axes.text(
+        left, level + 0.04 * half, text, va="bottom", fontsize=style.SMALL, zorder=6, bbox=PALE
+    )
 
 
 def rounded_length(length):

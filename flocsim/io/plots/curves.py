@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from flocsim.io.plots import outcomes, style
-from flocsim.io.plots.results import BARS, LABELS, PANEL_SIZE, ROOM, panel_grid
-from flocsim.io.plots.style import MICRO, Figure, drawing, plain
+from flocsim.io.plots.results import LABELS
+from flocsim.io.plots.style import MICRO, WIDTH, Figure, drawing, plain
 from flocsim.io.results.events import ENDS_COUNTED
+from flocsim.io.results.numerics import numerics_matter
 from flocsim.io.results.schema import Results
 from flocsim.io.results.strength_file import FAILED, OPENED, OPENS_AT_LEAST, Strengths
 from flocsim.io.results.swarm_file import mean
@@ -34,11 +35,12 @@ MARGIN = 0.5
 """Of the axis on either side, over the distance of two values if they were evenly spaced."""
 
 
-def against_key(results: SweepResults) -> Figure:
+def against_key(results: SweepResults, numerics: bool = False) -> Figure:
     """What becomes of replicates, and Pr[A], against the first swept key.
 
     Two panels per type, the bars stacked to 1; a bar and a line per N, delta and further keys.
     """
+    numerics = numerics or numerics_matter(results)
     first = next(iter(results.swept.values()))
     table = results.labelled("probabilities")
     names = table.columns["pr_a"].axes
@@ -52,9 +54,9 @@ def against_key(results: SweepResults) -> Figure:
         for name in [*ENDS_COUNTED, *EVENT_COUNTS, *(f"pr_a{end}" for end in outcomes.ENDS)]
     }
     count = len(types)
-    with drawing(2.35 * count + 2.0, 4.4) as figure:
+    with drawing(max(WIDTH, 1.3 * count + 0.4), 2.9) as figure:
         grid = figure.subplots(2, count, sharex=True, sharey="row", squeeze=False)
-        step = set_key_axis(grid[0, 0], first, where[order].astype(float))
+        step = set_key_axis(grid[0, 0], first, where[order].astype(float), count)
         step = min(WIDEST, step / len(words))
         colours, marked = style.graded_colours(len(words)), set()
         causes = outcomes.causes_of(columns, "pr_a")
@@ -68,18 +70,21 @@ def against_key(results: SweepResults) -> Figure:
                 shift = step * (index - 0.5 * (len(words) - 1))
                 mine = {name: values[number, index] for name, values in columns.items()}
                 outcomes.draw_ends(above, where[order], mine, 0.85 * step, shift)
-                line = outcomes.bands_in(mine, "pr_a")
+                line = outcomes.bands_in(mine, "pr_a", numerics)
                 outcomes.draw_bars(below, where[order], line, index, colours[index], shift=shift)
                 marked |= outcomes.mark_causes(
                     below, where[order], causes[number, index], colours[index], shift
                 )
             outcomes.note_if_empty(below, columns["pr_a"][number], "no decided collision")
-        grid[0, 0].set_ylabel("share of replicates")
+        grid[0, 0].set_ylabel("share of\nreplicates")
         grid[1, 0].set_ylabel(LABELS["pr_a"])
-        style.place_legend(grid[0, -1], outcomes.end_handles(), "bars from left:\nas lines below")
-        title = ",\n".join(line_title(name, results) for name in others)
-        title += BARS + outcomes.words_of(marked)
-        style.add_line_legend(grid[1, -1], words, colours, title)
+        title = ", ".join(line_title(name, results) for name in others)
+        style.place_legend(figure, {
+            "replicates": outcomes.end_handles(columns), title: style.line_handles(words, colours)
+        })  # fmt: skip
+        side = "Above, bars from left: as the lines below. " * (len(words) > 1)
+        told = side + outcomes.bars_of(results, numerics) + outcomes.words_of(marked)
+        style.add_foot(figure, told)
         return figure
 
 
@@ -106,9 +111,9 @@ def line_title(name, results):
     return key_label(swept, ()) if swept else plain(name)
 
 
-def set_key_axis(axes, swept, places):
+def set_key_axis(axes, swept, places, count):
     """An axis with a mark at every value (k,), in ascending order, and room beside the outermost;
-    the distance of the two nearest in points."""
+    the distance of the two nearest in points, of ``count`` panels beside each other."""
     from matplotlib.ticker import EngFormatter, FixedLocator, NullLocator, StrMethodFormatter
 
     steep = not swept.words and places[0] > 0.0 and places[-1] > STEEP * places[0]
@@ -118,7 +123,7 @@ def set_key_axis(axes, swept, places):
     margin = MARGIN * (np.ptp(at) / max(len(at) - 1, 1) or 0.1 * abs(at[0]) or 1.0)
     ends = at[0] - margin, at[-1] + margin
     axes.set_xlim(*(np.exp(ends) if steep else ends))
-    points = (at - ends[0]) / (ends[1] - ends[0]) * 72.0 * PANEL_SIZE[0] * ROOM
+    points = (at - ends[0]) / (ends[1] - ends[0]) * 72.0 * style.panel_width(count)
     axes.xaxis.set_major_locator(FixedLocator(places))
     axes.xaxis.set_minor_locator(NullLocator())
     if swept.words:
@@ -151,19 +156,18 @@ def over_time(results: SweepResults) -> Figure:
     times = table.axes["time"].values
     words = line_words([(name, table.axes[name].values.tolist()) for name in names])
     colours = style.graded_colours(len(words))
-    with drawing(9.2, 2.6) as figure:
-        panels = figure.subplots(1, len(SHOWN))
+    with drawing(WIDTH, 3.9) as figure:
+        panels = figure.subplots(len(SHOWN), 1, sharex=True)
         for axes, (name, factor, label) in zip(panels, SHOWN, strict=True):
             values = table.columns[name].values
             lines = mean(np.moveaxis(values, -2, 0)).reshape(-1, len(times))
-            drawn = [
-                axes.plot(times, factor * line, color=colour, label=word)[0]
-                for line, word, colour in zip(lines, words, colours, strict=True)
-            ]
-            axes.set_xlabel("time [s]")
-            axes.set_title(label, fontsize=8.0)
-        title = ",\n".join(line_title(name, results) for name in names)
-        style.place_legend(panels[-1], drawn, title)
+            for index, (line, colour) in enumerate(zip(lines, colours, strict=True)):
+                look = {"color": colour, "marker": style.marker(index)}
+                axes.plot(times, factor * line, markevery=0.2, **look)
+            axes.set_title(label)
+        panels[-1].set_xlabel("time [s]")
+        title = ", ".join(line_title(name, results) for name in names)
+        style.place_legend(figure, {title: style.line_handles(words, colours)})
         return figure
 
 
@@ -179,9 +183,9 @@ SWEEP_FIGURES: dict[str, dict[str, Callable[[Any], Figure]]] = {
 """Figures of a joined file, by the first of its groups."""
 
 
-MOST_LINES = 6
-BOUND_WORDS = "no hydrodynamic interaction: upper bounds"
-WATER_WORDS = "with hydrodynamic interaction"
+MOST_LINES = 5
+BOUND_WORDS = "Without hydrodynamic interaction: upper bounds."
+WATER_WORDS = "With hydrodynamic interaction."
 
 
 def kernels(results: Results) -> Figure:
@@ -198,24 +202,22 @@ def by_ratio(results: Results, name: str, label: str) -> Figure:
     """An estimate of all pairs against r_i/r_j, the larger one's size in colours, N by markers."""
     kernel = results.kernel
     assert kernel is not None, "a figure of a kernel study"
-    with drawing(2.6 * len(kernel.mechanisms) + 1.6, 2.9) as figure:
-        panels = figure.subplots(1, len(kernel.mechanisms), squeeze=False, sharey=True)[0]
+    titles = list(map(plain, kernel.mechanisms))
+    with style.panel_grid(titles, label, "$r$ of smaller / larger") as (figure, panels, spare):
         # Places of the larger classes whose lines are drawn: no more than can be told apart.
         count = len(kernel.labels)
         places = np.linspace(min(1, count - 1), count - 1, min(MOST_LINES, count))
         chosen = np.unique(places.round().astype(int)).tolist()
         colours = dict(zip(chosen, style.graded_colours(len(chosen)), strict=True))
-        for m, (axes, mechanism) in enumerate(zip(panels, kernel.mechanisms, strict=True)):
+        for m, axes in enumerate(panels):
             for v in range(len(kernel.vertices)):
                 for larger in chosen:
                     draw_line(axes, kernel, name, (m, v, larger), colours[larger])
-            axes.set(title=plain(mechanism), xlabel="r of the smaller over r of the larger")
             axes.set(xlim=(0.0, 1.05), ylim=(0.0, None))
             axes.grid(axis="y", color="0.9", linewidth=0.6)
-        panels[0].set_ylabel(label)
-        legend(panels[-1], kernel, colours)
-        words = WATER_WORDS if kernel.water else BOUND_WORDS
-        figure.supxlabel(words, fontsize=7, color="0.4")
+        style.place_legend(figure, legend(kernel, colours), spare)
+        bars = "Bars: 95 % sampling intervals. "
+        style.add_foot(figure, bars + (WATER_WORDS if kernel.water else BOUND_WORDS))
         return figure
 
 
@@ -230,22 +232,31 @@ def draw_line(axes, kernel, name, place, colour):
     known = np.isfinite(value)
     left_open = ~known & np.isfinite(high)
     axes.vlines(ratio[left_open], low[left_open], high[left_open], color=colour, linestyle=":")
-    look = {"color": colour, "marker": style.marker(v)}
-    if kernel.vertices[v] == 1:
-        look |= {"linestyle": ":", "markerfacecolor": "white"}
     reach = np.maximum([(value - low)[known], (high - value)[known]], 0.0)
-    axes.errorbar(ratio[known], value[known], reach, lw=1.0, elinewidth=0.7, ms=3.5, **look)
+    look = {"color": colour, **look_of(kernel, v)}
+    axes.errorbar(ratio[known], value[known], reach, elinewidth=0.7, **look)
 
 
-def legend(axes, kernel, colours):
-    """Colours for sizes, markers for N, beside the last panel."""
-    for place, colour in colours.items():
-        axes.plot([], [], color=colour, label=f"larger: {MICRO * kernel.radii[place]:.3g} µm")
-    for v, count in enumerate(kernel.vertices):
-        word = "spheres" if count == 1 else f"N = {count}"
-        hollow = {"linestyle": ":", "markerfacecolor": "white"} if count == 1 else {}
-        axes.plot([], [], color="0.3", marker=style.marker(v), label=word, **hollow)
-    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+def look_of(kernel, v):
+    """Marker and dashes of a number of vertices: spheres are hollow and dotted."""
+    hollow = {"linestyle": ":", "markerfacecolor": "white"} if kernel.vertices[v] == 1 else {}
+    return {"marker": style.marker(v), **hollow}
+
+
+def legend(kernel, colours):
+    """{title: handles}: colours for sizes, markers for N."""
+    from matplotlib.lines import Line2D
+
+    sizes = [
+        Line2D([], [], color=colour, label=f"{MICRO * kernel.radii[place]:.3g} µm")
+        for place, colour in colours.items()
+    ]
+    counts = [
+        Line2D([], [], color="0.3", label="sphere" if count == 1 else str(count),
+               **look_of(kernel, v))
+        for v, count in enumerate(kernel.vertices)
+    ]  # fmt: skip
+    return {"$r$ of larger": sizes, "vertices $N$": counts}
 
 
 KERNEL_FIGURES: dict[str, Callable[[Results], Figure]] = {
@@ -267,9 +278,9 @@ def shares_opened(found: Strengths, type_place: int, vertices_place: int) -> tup
 def over_rate(found: Strengths) -> Figure:
     """A panel per type, a line per N, all displacements together."""
     types, vertices = found.table("type"), found.table("vertices")
-    x_label = f"rate G of the {plain(found.about.get('flow'))} [1/s]"
+    x_label = f"$G$ of the {plain(found.about.get('flow'))} [1/s]"
     titles = style.type_titles(types)
-    with panel_grid(titles, "share of bonds opened", 2.0, x_label) as (figure, panels, last):
+    with style.panel_grid(titles, "share of bonds opened", x_label) as (figure, panels, spare):
         colours = style.graded_colours(len(vertices))
         for number, axes in enumerate(panels):
             any_opened = 0
@@ -278,12 +289,13 @@ def over_rate(found: Strengths) -> Figure:
                 any_opened += len(rates)
                 if len(rates):
                     look = {"color": colours[place], "marker": style.marker(place)}
-                    axes.plot(rates, shares, drawstyle="steps-post", markersize=3, **look)
+                    axes.plot(rates, shares, drawstyle="steps-post", **look)
             axes.set(ylim=(0.0, 1.04), xscale="log")
             if not any_opened:
                 style.note(axes, "no bond opened")
         style.set_log_axis(panels[0].xaxis)
-        style.add_line_legend(last, [f"{n}" for n in vertices], colours, "N")
+        words = ["sphere" if n == 1 else f"{n}" for n in vertices]
+        style.place_legend(figure, {"vertices $N$": style.line_handles(words, colours)}, spare)
         return figure
 
 

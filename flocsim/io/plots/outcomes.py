@@ -15,10 +15,11 @@ from flocsim.io.confidence import bounded_sums, clustered_proportion, explained_
 from flocsim.io.plots import style
 from flocsim.io.plots.style import Figure, drawing, plain
 from flocsim.io.results.events import NOT_COLLIDED, ends_of, events, events_of
+from flocsim.io.results.numerics import numerics_matter
 from flocsim.io.results.schema import SHAPE_MEASURES, Results
 
 COLOURS = {
-    "aggregated": "#0072B2", "departed": "#56B4E9", "missed": "0.85", "held": "#009E73",
+    "aggregated": "#0072B2", "departed": "#56B4E9", "missed": "0.8", "held": "#009E73",
     "undecided": "#E69F00", "failed": "#D7191C",
 }  # fmt: skip
 """Of the ends of replicates, in the order of the stack."""
@@ -91,7 +92,7 @@ def mark_causes(
 ) -> set[str]:
     """A letter on the axis at each place (k,) that has a cause; the causes that were marked."""
     look = {"color": colour, "clip_on": False, "transform": shifted(axes, shift)}
-    look |= {"linestyle": "", "ms": 4.5, "markeredgewidth": 0.2}
+    look |= {"linestyle": "", "ms": 4.0, "markeredgewidth": 0.2}
     for word in (found := {str(each) for each in causes if each}):
         at = places[causes == word]
         axes.plot(at, np.full(len(at), MARK_AT), marker=f"${LETTERS[word]}$", **look)
@@ -99,9 +100,18 @@ def mark_causes(
 
 
 def words_of(marked: set[str]) -> str:
-    """What the letters of these causes say, for a legend; "" for none."""
-    lines = [f"\n {LETTERS[word]}: {word}" for word in LETTERS if word in marked]
-    return "\nno value where" + "".join(lines) if lines else ""
+    """What the letters of these causes say, for the foot; "" for none."""
+    told = [f"{LETTERS[word]}: {word}" for word in LETTERS if word in marked]
+    return f" No value: {', '.join(told)}." if told else ""
+
+
+def bars_of(results: Any, numerics: bool) -> str:
+    """What the bars of a figure mean, for the foot; with ``numerics`` drawn, and why."""
+    outlines = bool(getattr(results, "outlines", {}))  # a sweep has none
+    added = ["numerical error"] * numerics + ["error of the outlines"] * outlines
+    thin = f"; thin: plus {' and '.join(added)}" if added else ""
+    large = " (large somewhere)" * (numerics and numerics_matter(results))
+    return f"Bars: 95 % sampling intervals{thin}{large}."
 
 
 def shifted(axes: Any, points: float) -> Any:
@@ -111,18 +121,19 @@ def shifted(axes: Any, points: float) -> Any:
     return axes.transData + ScaledTranslation(points / 72.0, 0.0, axes.figure.dpi_scale_trans)
 
 
-def end_handles() -> list[Any]:
-    """Handles of a legend of the stack, the topmost first."""
+def end_handles(counts: Mapping[str, np.ndarray]) -> list[Any]:
+    """Handles of a legend of the ends that occur, in the order of the stack."""
     from matplotlib.patches import Patch
 
-    return [Patch(facecolor=colour, label=word) for word, colour in reversed(COLOURS.items())]
+    there = [word for word, number in ends_of(counts).items() if np.any(number)]
+    return [Patch(facecolor=COLOURS[word], label=word) for word in there]
 
 
-def draw_probability(axes, results, number, name):
+def draw_probability(axes, results, number, name, numerics, most=style.MOST_LABELS):
     """The lines of a type, for each delta; the causes of what has no value."""
     causes, marked = causes_of(results.probabilities, name)[number], set()
-    bands = [band[number] for band in bands_of(results, name)]
-    style.set_vertex_axis(axes, results.vertices)
+    bands = [band[number] for band in bands_of(results, name, numerics)]
+    style.set_vertex_axis(axes, results.vertices, most)
     style.set_probability_axis(axes)
     count, few = results.delta.size, trials_of(results, name)[number] < FEW
     for index, colour in enumerate(style.graded_colours(count)[:count]):
@@ -138,10 +149,10 @@ def trials_of(results, name):
     return events_of(results.probabilities)[name].trials
 
 
-def draw_shares(axes, results, number, name):
+def draw_shares(axes, results, number, name, numerics, most=style.MOST_LABELS):
     """The classes or kinds of bond of one type, counts pooled over delta."""
-    bands = share_bands(results, number, name)
-    style.set_vertex_axis(axes, results.vertices)
+    bands = share_bands(results, number, name, numerics)
+    style.set_vertex_axis(axes, results.vertices, most)
     style.set_probability_axis(axes)
     colours = SHARES[name][-1].values()
     for index, colour in enumerate(colours):
@@ -150,11 +161,11 @@ def draw_shares(axes, results, number, name):
     note_if_empty(axes, bands[0], NO_EVENTS[name])
 
 
-def share_bands(results, number, name):
+def share_bands(results, number, name, numerics):
     """(share, low, high, least and most change by numerics) (vertices, class or bond) of one
     type."""
     table, share = results.probabilities, SHARES[name][0]
-    errors = over_delta(table, share, table[f"{share}_numerical"])[number]
+    errors = numerics * over_delta(table, share, table[f"{share}_numerical"])[number]
     changes = [-errors, errors]
     for side, end in enumerate(ENDS[1:3]) if results.outlines else ():
         shape = over_delta(table, share, results.outlines[f"{share}_shape{end}"])
@@ -162,18 +173,18 @@ def share_bands(results, number, name):
     return (*shares_of(results, number, name), *changes)
 
 
-def bands_in(table, name):
-    """[value, low, high, least and most change by numerics] of a probability in a table."""
-    value, low, high, numerical = (table[name + end] for end in ENDS)
-    return [value, low, high, -numerical, numerical]
+def bands_in(table, name, numerics):
+    """[value, low, high, least and most change by numerics, if drawn] of a probability."""
+    value, low, high, error = (table[name + end] for end in ENDS)
+    return [value, low, high, -numerics * error, numerics * error]
 
 
-def bands_of(results, name):
+def bands_of(results, name, numerics):
     """The same of the conditions of results, which may know the sign of what numerics change; with
     what outlines cut otherwise change."""
-    bands = bands_in(results.probabilities, name)
+    bands = bands_in(results.probabilities, name, numerics)
     for side, end in enumerate(ENDS[1:3], start=3):
-        if results.numerics:
+        if results.numerics and numerics:
             bands[side] = results.numerics[f"{name}_change{end}"]
         if results.outlines:
             bands[side] = bands[side] + np.nan_to_num(results.outlines[f"{name}_shape{end}"])
@@ -230,8 +241,8 @@ def draw_bars(axes, places, bands, index, colour, few=None, shift=0.0):
     """
     value, low, high, lowers, raises = bands
     reach = np.clip([value - low, high - value], 0.0, None)
-    size, width = (2.2, 0.8) if len(places) > style.CROWDED else (4.0, 1.2)
-    thin, thinner = 0.6 * width, 0.2 * width
+    size, width = (1.8, 0.7) if len(places) > style.CROWDED else (3.2, 1.0)
+    thin, thinner = 0.8 * width, 0.4 * width
     moved = {"transform": shifted(axes, shift)}
     whole = moved | {"clip_on": False}
     points = whole | {"color": colour, "marker": style.marker(index), "ms": size}
@@ -258,10 +269,10 @@ def note_if_empty(axes, values, text):
 ALL_COLOUR = "0.15"
 
 PAIR_MEASURES = {
-    "aspect_ratio": "mean aspect ratio",
-    "circularity": "mean circularity",
-    "solidity": "mean solidity",
-    "size_ratio": "size ratio, smaller over larger",
+    "aspect_ratio": "mean\naspect ratio",
+    "circularity": "mean\ncircularity",
+    "solidity": "mean\nsolidity",
+    "size_ratio": "size\nratio",
 }
 """What is said of the shapes of two flocs: of both the mean, of their radii the ratio."""
 
@@ -354,35 +365,40 @@ def shape_effects(results: Results) -> Figure:
     A row of panels for each collision type, at the largest N, all displacements pooled. Points:
     the replicates in up to five bins of about equally many, with 95 % intervals. Titles: the share
     of the variance of Pr[A] between replicates that the bins explain, with its 95 % interval, and
-    at the end of a row that which is explained by which two flocs met.
+    beside a row that which is explained by which two flocs met.
     """
     number = int(np.argmax(results.vertices))
     count = len(results.types)
     rows = {} if results.replicates is None else {
         name: results.replicates[name][:, number] for name in SHAPE_COLUMNS
     }  # fmt: skip
-    with drawing(2.15 * len(PAIR_MEASURES) + 1.9, 1.95 * count + 0.5) as figure:
+    with drawing(style.WIDTH, 1.15 * count + 0.4) as figure:
         grid = figure.subplots(count, len(PAIR_MEASURES), sharey=True, sharex="col", squeeze=False)
         for t, (row, title) in enumerate(zip(grid, style.type_titles(results.types), strict=True)):
-            row[0].set_ylabel(f"{title}\nprobability")
             for axes in row:
                 style.set_probability_axis(axes)
+                axes.locator_params(axis="x", nbins=2)
+                axes.xaxis.set_major_formatter("{x:g}")
+            row[0].set_ylabel(title)
             if not rows:
-                style.note(row[0], "only for finished studies")
+                style.note(row[0], "only for\nfinished\nstudies")
                 continue
             own = {name: each[t] for name, each in rows.items()}
             effects = {name: shape_effect(own, name) for name in PAIR_MEASURES}
             for axes, effect in zip(row, effects.values(), strict=True):
                 draw_effect(axes, effect)
-                axes.set_title(share_words("explains", effect.explained), fontsize=7.5)
-            of_pairs = share_words("which flocs met\nexplains", effects["size_ratio"].by_pair)
-            row[-1].text(1.04, 0.0, of_pairs, fontsize=7.5, transform=row[-1].transAxes)
+                axes.set_title(share_words(effect.explained), fontsize=style.SMALL)
+            if of_pairs := share_words(effects["size_ratio"].by_pair):
+                row[0].set_ylabel(f"{title}\nflocs: {of_pairs}")
         for axes, label in zip(grid[-1], PAIR_MEASURES.values(), strict=True):
             axes.set_xlabel(label)
         words = [r"$\Pr[A]$", *(plain(style.CLASS_WORDS[name]) for name in style.CLASS_COLOURS)]
-        title = f"$N$ = {results.vertices[number]}\n(bars: 95 %)"
         colours = [ALL_COLOUR, *style.CLASS_COLOURS.values()]
-        style.add_line_legend(grid[0, -1], words, colours, title)
+        title = f"$N$ = {results.vertices[number]}"
+        style.place_legend(figure, {title: style.line_handles(words, colours)})
+        style.add_foot(figure, "Above panels: share of the variance of Pr[A] that the measure "
+                       "explains (95 %); beside rows: that which flocs met explains. "
+                       "Bars: 95 % sampling intervals.")  # fmt: skip
         return figure
 
 
@@ -401,9 +417,9 @@ def draw_effect(axes, effect):
         style.note(axes, "no decided collision\nof known shapes")
 
 
-def share_words(subject, share):
+def share_words(share):
     """A share of variance in words."""
     value, low, high = (100.0 * each for each in share)
     if np.isnan(value):
         return ""
-    return f"{subject} {value:.2g} % ({low:.2g} to {high:.2g})"
+    return f"{value:.0f} % ({low:.0f}–{high:.0f})"

@@ -37,9 +37,6 @@ DODGE = 0.06
 BELOW_LEGEND = 0.66
 """Share of a panel's height that is left to the data below a legend."""
 
-PANEL_SIZE = (2.6, 2.3)
-MARGIN = 0.75
-
 
 MEASURES = {
     "aspect_ratio": "aspect ratio",
@@ -56,7 +53,7 @@ def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
     """
     sizes = np.array([1e6 * entry.measured_radius for entry in one_each(entries)])
     bins = bins_of(sizes, 0.0)
-    with drawing(4.2, 2.8) as figure:
+    with drawing(style.WIDTH, 2.0) as figure:
         axes = figure.subplots()
         axes.hist(sizes, bins=bins, **BARS)
         marks = ((np.median(sizes), "median", "--"), (sizes.mean(), "mean", ":"))
@@ -65,7 +62,7 @@ def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
         title = f"{len(sizes)} flocs, {sizes.min():.3g} to {sizes.max():.3g} µm"
         axes.set(xlabel=r"equivalent radius $r_\mathrm{eq}$ [µm]", ylabel="number of flocs",
                  title=title, xlim=(0.0, None))  # fmt: skip
-        axes.legend()
+        style.place_legend(figure, {"": axes.get_legend_handles_labels()[0]})
         return figure
 
 
@@ -82,9 +79,9 @@ def sizes(entries: Sequence[ShapeEntry]) -> Figure:
     found = np.array([2e6 * entry.measured_radius for entry in one_each(entries)])
     bins = bins_of(found, 0.0)
     top = 0.0
-    with drawing(6.4, 2.8) as figure:
-        panels = figure.subplots(1, 2, sharex=True, sharey=True)
-        for axes, word, by_volume in zip(panels, ("number", "volume"), (False, True), strict=True):
+    titles, x_label = ("by number", "by volume"), "diameter $2r_\\mathrm{eq}$ [µm]"
+    with style.panel_grid(titles, "share", x_label, 1.8) as (figure, panels, _):
+        for axes, by_volume in zip(panels, (False, True), strict=True):
             weights = found**3 if by_volume else np.ones(found.size)
             bars, _, _ = axes.hist(found, bins=bins, weights=weights / weights.sum(), **BARS)
             top = max(top, bars.max())
@@ -92,10 +89,9 @@ def sizes(entries: Sequence[ShapeEntry]) -> Figure:
             for value, share, dashes in marks:
                 label = f"D{100 * share:.0f} = {value:.3g} µm"
                 axes.axvline(value, ymax=BELOW_LEGEND, color="0.25", linestyle=dashes, label=label)
-            axes.set(title=f"by {word}", xlabel="diameter $2r_\\mathrm{eq}$ [µm]")
             axes.set_xlim(left=0.0)
             axes.legend(loc="upper left")
-        panels[0].set(ylabel="share", ylim=(0.0, top / BELOW_LEGEND))
+        panels[0].set(ylim=(0.0, top / BELOW_LEGEND))
         return figure
 
 
@@ -105,17 +101,15 @@ def shape(entries: Sequence[ShapeEntry]) -> Figure:
     found = [measures_in(entry) for entry in flocs]
     areas = np.array([np.pi * (1e6 * entry.measured_radius) ** 2 for entry in flocs])
     perimeters = np.array([1e6 * each.perimeter for each in found])
-    with drawing(6.4, 4.8) as figure:
+    with drawing(style.WIDTH, 3.2) as figure:
         panels = figure.subplots(2, 2).ravel()
         for axes, (name, label) in zip(panels, MEASURES.items(), strict=False):
             values = np.array([getattr(each, name) for each in found])
             axes.hist(values, bins=bins_of(values, values.min()), **BARS)
             middle = np.median(values)
-            axes.axvline(middle, color="0.25", linestyle="--", label=f"median {middle:.3g}")
-            room = 1.2 * axes.get_ylim()[1]  # for the legend above the bars
-            axes.set(xlabel=label, ylabel="number of flocs", ylim=(0.0, room))
+            axes.axvline(middle, color="0.25", linestyle="--")
+            axes.set(xlabel=label, ylabel="number of flocs", title=f"median {middle:.3g}")
             axes.yaxis.get_major_locator().set_params(integer=True)
-            axes.legend()
         draw_dimension(panels[3], areas, perimeters)
         return figure
 
@@ -124,16 +118,16 @@ def draw_dimension(axes, areas, perimeters):
     """Perimeter against area, a disc's, and the line of D_f2."""
     axes.plot(areas, perimeters, "o", color="#0072B2", ms=2.5)
     ends = np.array([areas.min(), areas.max()])
-    axes.plot(ends, 2.0 * np.sqrt(np.pi * ends), color="0.6", linewidth=0.8, label="disc")
+    axes.plot(ends, 2.0 * np.sqrt(np.pi * ends), color="0.5", linestyle="--", label="disc")
     if (found := perimeter_dimension(areas, perimeters)) is not None:
         slope, error = found
         middle = np.exp(np.log(perimeters).mean() - 0.5 * slope * np.log(areas).mean())
-        label = f"$D_{{f2}}$ = {slope:.2f} ± {error:.2f}"
-        axes.plot(ends, middle * ends ** (0.5 * slope), color="#D55E00", label=label)
+        axes.plot(ends, middle * ends ** (0.5 * slope), color="#D55E00")
+        axes.set_title(f"$D_{{f2}}$ = {slope:.2f} ± {error:.2f}")
     axes.set(xscale="log", yscale="log", xlabel="area [µm²]", ylabel="perimeter [µm]")
     style.set_log_axis(axes.xaxis)
     style.set_log_axis(axes.yaxis)
-    axes.legend()
+    axes.legend(loc="lower right")
 
 
 def figure_3(entries: Sequence[ShapeEntry]) -> Figure:
@@ -143,16 +137,14 @@ def figure_3(entries: Sequence[ShapeEntry]) -> Figure:
     (N = 1).  The classes part at r_eq = 5 px, the paper's 5 µm.
     """
     radii = sorted({entry.spheroradius for entry in entries})
-    with drawing(PANEL_SIZE[0] * len(radii) + MARGIN, PANEL_SIZE[1] + MARGIN) as figure:
-        panels = figure.subplots(1, len(radii), sharey=True, squeeze=False)[0]
+    titles = [f"spheroradius r = {radius:g} px" for radius in radii]
+    with style.panel_grid(titles, "error RE [%]") as (figure, panels, spare):
         for radius, axes in zip(radii, panels, strict=True):
             draw_errors(axes, [e for e in entries if e.spheroradius == radius])
-            axes.set(title=f"spheroradius r = {radius:g} px", xlabel="vertices $N$")
-        panels[0].set_ylabel("relative error RE [%]")
-        room = panels[0].dataLim.ymax / BELOW_LEGEND
-        panels[0].set_ylim(0.0, max(panels[0].get_ylim()[1], room))
-        title = "mean ± standard deviation\ndashed: circle of equal area"
-        panels[0].legend(title=title, alignment="left", loc="upper right")
+        panels[0].set_ylim(bottom=0.0)
+        style.place_legend(figure, {"": panels[0].get_legend_handles_labels()[0]}, spare)
+        style.add_foot(figure, "Mean ± standard deviation of the relative error; dashed: circle of "
+                       "equal area.")  # fmt: skip
         return figure
 
 
@@ -341,13 +333,13 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
     cores = [ring * (1.0, -1.0) for ring in fit.parts[0].rings]
     outlines = [ring * (1.0, -1.0) for ring in swept_rings(fit.parts, ROUND_POINTS)]
     count = len(fit.vertices)
-    height = min(max(2.2 * mask.shape[0] / mask.shape[1], 1.2), 4.0)
-    with drawing(9.2, height + 0.6) as figure:
+    height = min(max(1.6 * mask.shape[0] / mask.shape[1], 0.9), 3.0)
+    with drawing(style.WIDTH, 2.0 * (height + 0.25)) as figure:
         from matplotlib.colors import to_rgb
         from matplotlib.patches import Circle, Polygon
 
         inside = covered_by(outlines, mask.shape)
-        panels = figure.subplots(1, 4, sharex=True, sharey=True)
+        panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
         for axes in panels:
             axes.imshow(np.where(mask, 0.78, 1.0), cmap="gray", vmin=0.0, vmax=1.0,
                         interpolation="nearest")  # fmt: skip
@@ -371,15 +363,14 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
         panels[3].imshow(colours, interpolation="nearest")
         words = (
             f"mask: {int(mask.sum())} px", f"core: N = {count}",
-            f"swept by a disk of r = {fit.radius:.3g} px",
+            f"swept by a disk, r = {fit.radius:.3g} px",
             f"V = {fit.wrong_pixels} px, RE = {fit.relative_error:.2f} %",
         )  # fmt: skip
         for axes, text in zip(panels, words, strict=True):
-            axes.set_title(text, fontsize=8)
-        panels[3].text(0.0, -0.02, "blue: missing, orange: in excess", fontsize=7, va="top",
-                       transform=panels[3].transAxes)  # fmt: skip
+            axes.set_title(text)
+        style.add_foot(figure, "Lower right: blue pixels are missing, orange ones in excess.")
         if name:
-            figure.suptitle(plain(name, style.MOST_OF_TITLE), x=0.01, ha="left", fontsize=9)
+            figure.suptitle(plain(name, style.MOST_OF_TITLE), x=0.01, ha="left", fontsize=7)
         return figure
 
 

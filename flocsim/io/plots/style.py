@@ -27,25 +27,37 @@ MICRO = 1e6
 LAST = 1500
 """Milliseconds for which an animation shows its last frame."""
 
+WIDTH = 3.4
+"""Inches, a column of a journal: every figure is so wide, and has no letters below SMALL points, so
+that they have 6 points where it is 8 cm wide."""
+SMALL = 6.5
+
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
-    "font.size": 8.0,
-    "axes.titlesize": 9.0,
+    "font.size": 7.0,
+    "axes.titlesize": 7.0,
     "axes.titlelocation": "left",
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.linewidth": 0.7,
+    "axes.linewidth": 0.6,
     "axes.edgecolor": "0.35",
     "axes.axisbelow": True,
     "xtick.color": "0.25",
     "ytick.color": "0.25",
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
     "legend.frameon": False,
-    "lines.linewidth": 1.2,
-    "lines.markersize": 4.0,
+    "legend.fontsize": SMALL,
+    "legend.title_fontsize": SMALL,
+    "legend.borderpad": 0.2,
+    "legend.borderaxespad": 0.2,
+    "legend.columnspacing": 1.2,
+    "lines.linewidth": 1.0,
+    "lines.markersize": 3.2,
     "figure.dpi": 100.0,
-    "savefig.dpi": 200.0,
+    "savefig.dpi": 400.0,
     "pdf.fonttype": 42,
     # Without a fixed salt every SVG gets random names inside.
     "svg.hashsalt": "flocsim",
@@ -57,11 +69,11 @@ BOND_COLOURS = {"certificate": "#009E73", "hook": "#CC79A7", "rest": "#999999"}
 BODY_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
 CONTACT_COLOUR = "#D7191C"
 MARKERS = "osD^vPX*"
-MOST_LABELS = 8
+MOST_LABELS = 6
 """More labels of vertex counts than this would run into each other."""
 WIDE = 5.0
 """Ends of a logarithmic axis that differ by so much have two of 1, 2 and 5 of a decade between."""
-LONG = 1000.0
+LONG = 30.0
 """Ends from which on labels at 2 and 5 would touch."""
 PLAIN = (1e-3, 2e5)
 """Numbers that are written out."""
@@ -71,11 +83,10 @@ MOST_LETTERS = 40
 """Of a name or a word of a label, a legend or a panel's title."""
 MOST_OF_TITLE = 300
 """Letters of a title that has the whole figure's width, and is broken."""
-LEGEND_ROWS = 9
-FOOT_HEIGHT = 0.13
-"""Inches of the line at the foot of a figure."""
-LEGEND_ROOM, MOST_GROWTH = 2.0, 30.0
-"""Inches that a legend may take of a figure, and by which a figure grows at most for it."""
+PANELS_PER_ROW = 2
+PANEL_HEIGHT = 1.35
+FOOT_HEIGHT = 0.115
+"""Inches of a line at the foot of a figure."""
 CROWDED = 50
 """Points in a panel from which on markers and lines are drawn finer."""
 
@@ -153,6 +164,34 @@ def drawing(width: float, height: float) -> Iterator[Figure]:
         yield new_figure(width, height)
 
 
+@contextlib.contextmanager
+def panel_grid(
+    titles: Sequence[str], y_label: str, x_label: str = "vertices $N$", height: float = PANEL_HEIGHT
+) -> Iterator[tuple[Figure, list[Any], Any]]:
+    """(a figure with equal panels of these titles, two a row, the panels, and a place of the grid
+    that has none, or None); ``height`` of a panel [inches]."""
+    count = len(titles)
+    columns = min(count, PANELS_PER_ROW)
+    rows = -(-count // columns)
+    with drawing(WIDTH, height * rows + 0.2) as figure:
+        grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+        for axes in grid[count:]:
+            axes.set_visible(False)
+        for axes in grid[max(count - columns, 0) : count]:
+            axes.xaxis.set_tick_params(labelbottom=True)
+            axes.set_xlabel(x_label)
+        for axes, title in zip(grid, titles, strict=False):
+            axes.set_title(title)
+        for axes in grid[:count:columns]:
+            axes.set_ylabel(y_label)
+        yield figure, list(grid[:count]), grid[-1] if len(grid) > count else None
+
+
+def panel_width(count: int) -> float:
+    """Inches that the axis of each of ``count`` panels has, about."""
+    return (WIDTH - 0.3) / min(count, PANELS_PER_ROW) - 0.15
+
+
 def keep_titles_whole(figure: Figure) -> None:
     """Draw a figure, the lines of titles broken that are wider than the room they have.
 
@@ -169,7 +208,7 @@ def keep_titles_whole(figure: Figure) -> None:
         title.set_visible(True)
     panels = [(axes, axes.get_window_extent()) for axes in figure.axes if axes.get_visible()]
     added = dict.fromkeys([box.y1 for _, box in panels], 0.0)
-    for text in filter(None, [figure._suptitle, figure._supxlabel]):
+    for text in filter(None, [figure._suptitle]):
         more = wrap(text, width - text.get_window_extent().x0 - 4.0)
         added[math.inf] = added.get(math.inf, 0.0) + more
     for axes, box in panels:
@@ -207,21 +246,35 @@ def wrap(text, room):
 def mark_figure(figure: Figure, words: str) -> None:
     """Say something of the whole figure, in red above it: that its results are unfinished."""
     before = f"\n{figure._suptitle.get_text()}" if figure._suptitle else ""
-    figure.suptitle(words + before, x=0.01, ha="left", fontsize=9, color=CONTACT_COLOUR)
+    figure.suptitle(words + before, x=0.01, ha="left", fontsize=7, color=CONTACT_COLOUR)
 
 
 def add_foot(figure: Figure, words: str) -> None:
-    """Name the source of what a figure shows, small, at its foot, for which it grows."""
+    """Add lines at the foot of a figure, small: notes on what is drawn; last of all its source.
+
+    The figure grows by them.
+    """
     above = f"{figure._supxlabel.get_text()}\n" if figure._supxlabel else ""
     words = plain(words, MOST_OF_TITLE)
     if not words or words in " ".join(above.split()):
         return
-    figure.set_figheight(figure.get_figheight() + FOOT_HEIGHT)
     with house_style():
-        figure.supxlabel(above + words, x=0.01, ha="left", fontsize=6, color="0.4")
-    for legend in figure.legends:  # below all panels, and above the line
-        low = FOOT_HEIGHT / figure.get_figheight()
+        foot = figure.supxlabel(above + words, x=0.01, ha="left", va="bottom", fontsize=SMALL,
+                                color="0.3")  # fmt: skip
+    wrap(foot, figure.bbox.width)
+    before, after = (1 + text.count("\n") for text in (above, foot.get_text()))
+    added = after - before + (not above)
+    figure.set_figheight(figure.get_figheight() + FOOT_HEIGHT * added)
+    low = (FOOT_HEIGHT * after + 0.04) / figure.get_figheight()
+    foot.set_y(0.02 / figure.get_figheight())
+    # The layout would take the larger of a legend's and a label's height, not their sum.
+    foot.set_in_layout(False)
+    taken = low
+    for legend in figure.legends:
+        taken += legend.get_window_extent().height / figure.bbox.height
         legend.set_bbox_to_anchor((0.0, low, 1.0, 1.0 - low), figure.transSubfigure)
+    if figure.get_layout_engine() is not None:
+        figure.get_layout_engine().set(rect=(0.0, taken, 1.0, 1.0 - taken))
 
 
 def graded_colours(count):
@@ -255,14 +308,14 @@ def vertex_positions(vertices):
     return np.searchsorted(np.unique(vertices), vertices).astype(float)
 
 
-def set_vertex_axis(axes, vertices):
+def set_vertex_axis(axes, vertices, most=MOST_LABELS):
     """Ticks at the vertex counts, N = 1 called "sphere".
 
-    Labels are thinned until none touch; the first and last always show.
+    Labels are thinned to the ``most`` that fit; the first and last always show.
     """
     counts = np.unique(vertices)
     words = ["sphere" if count == 1 else str(count) for count in counts]
-    every = -(-len(words) // MOST_LABELS)
+    every = -(-len(words) // most)
     for index in range(1, len(words)):
         if (len(words) - 1 - index) % every or index < every:
             words[index] = ""
@@ -279,7 +332,7 @@ def set_share_axis(axes):
 
 def set_probability_axis(axes):
     axes.set_ylim(-0.03, 1.03)
-    axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], labels=["0", "0.25", "0.5", "0.75", "1"])
+    axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], labels=["0", "", "0.5", "", "1"])
     axes.grid(axis="y", color="0.9", linewidth=0.6)
 
 
@@ -309,33 +362,57 @@ def note(axes, words):
     axes.text(0.5, 0.5, words, color="0.4", ha="center", va="center", transform=axes.transAxes)
 
 
-def add_line_legend(axes, words, colours, title):
-    """A legend of lines by their words."""
+def line_handles(words, colours):
+    """Handles of a legend of lines by their words."""
     from matplotlib.lines import Line2D
 
-    handles = [
+    return [
         Line2D([], [], color=colour, marker=marker(index), label=word)
         for index, (word, colour) in enumerate(zip(words, colours, strict=False))
     ]
-    place_legend(axes, handles, title)
 
 
-def place_legend(axes, handles, title):
-    """A legend beside a panel. The figure grows by what it is wider than the room beside panels:
-    else long words, or many columns, would leave none to these."""
-    legend = axes.legend(
-        handles=handles,
-        title=title,
-        loc="upper left",
-        bbox_to_anchor=(1.02, 1.0),
-        borderaxespad=0.0,
-        ncols=-(-len(handles) // LEGEND_ROWS),
-        alignment="left",
-    )
-    figure = axes.figure
-    more = legend.get_window_extent().width / figure.dpi - LEGEND_ROOM
-    if more > 0.0:
-        figure.set_figwidth(figure.get_figwidth() + min(more, MOST_GROWTH))
+def place_legend(figure, groups, spare=None):
+    """A legend of {title: handles}: each group a column, or a single one in as many columns as fit.
+
+    It stands in ``spare``, a place of the grid without a panel, or below all panels, for which the
+    figure grows.
+    """
+    if len(groups) == 1:
+        [(title, handles)] = groups.items()
+        widest = range(len(handles), 0, -1)
+    else:
+        title, handles, widest = None, side_by_side(groups), [len(groups)]
+    look = {"handles": handles, "title": title or None, "alignment": "left"}
+    if spare is not None:
+        spare.set_visible(True)
+        spare.set_axis_off()
+        spare.legend(loc="upper left", borderaxespad=0.0, **look)
+        return
+    for columns in widest:
+        legend = figure.legend(ncols=columns, **look)
+        box = legend.get_window_extent()
+        legend.remove()
+        if box.width <= figure.bbox.width:
+            break
+    rows = -(-len(handles) // columns)  # as few columns as these rows need
+    figure.legend(loc="outside lower center", ncols=-(-len(handles) // rows), **look)
+    figure.set_figheight(figure.get_figheight() + box.height / figure.dpi)
+
+
+def side_by_side(groups):
+    """Handles of {title: handles}, each group filled up to the longest, its title above it."""
+    from matplotlib.lines import Line2D
+
+    def words(text):
+        return Line2D([], [], linestyle="none", label=text)
+
+    most = max(map(len, groups.values()))
+    columns = [
+        [words(title), *handles, *[words(" ")] * (most - len(handles))]
+        for title, handles in groups.items()
+    ]
+    return [handle for column in columns for handle in column]
 
 
 def marker(index):

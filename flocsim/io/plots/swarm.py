@@ -18,10 +18,16 @@ from flocsim.io.files import Rule
 from flocsim.io.plots.collision import rings_path, svg_path
 from flocsim.io.plots.style import (
     MICRO,
+    WIDTH,
     Figure,
+    add_foot,
     drawing,
     frame_of,
     graded_colours,
+    line_handles,
+    marker,
+    panel_grid,
+    place_legend,
     save_gif,
     set_log_axis,
 )
@@ -54,46 +60,45 @@ def snapshots(results: SwarmResults) -> Figure:
     times = results.scales["time"]
     chosen = places_shown(results, SNAPSHOTS)
     width, height = results.groups["bodies"]["box"][0]
-    tall = min(max(2.3 * height / width, 1.2), 5.0)
-    with drawing(2.3 * len(chosen), tall + 0.3) as figure:
-        panels = figure.subplots(1, len(chosen), squeeze=False)[0]
+    titles = [f"{times[place]:.4g} s" for place in chosen]
+    tall = 0.25 + min(max(1.4 * height / width, 0.8), 3.0)
+    with panel_grid(titles, "y [µm]", "x [µm]", tall) as (figure, panels, _):
         for axes, place in zip(panels, chosen, strict=True):
             draw_bodies(axes, results, 0, int(place))
-            axes.set_title(f"{times[place]:.4g} s")
-        panels[0].set_ylabel("y [µm]")
         return figure
 
 
 def clusters(results: SwarmResults) -> Figure:
     """Clusters over time: their number, sizes, radius of gyration and settling, of all swarms."""
     counts, times = results.groups["counts"], results.scales["time"]
-    endless = np.any(counts["percolating"] > 0.0)
-    finite = ",\nof those that do not percolate" if endless else ""
     shown = [
         ("clusters", 1.0, "clusters"),
-        ("mean_size", 1.0, "body-weighted mean cluster size"),
-        ("gyration", MICRO, f"radius of gyration [µm]{finite}"),
+        ("mean_size", 1.0, "body-weighted mean size"),
+        ("gyration", MICRO, "radius of gyration [µm]"),
         ("settling", 1e3, "settling [mm/s]"),
     ]
-    with drawing(9.2, 2.3) as figure:
-        *panels, last = figure.subplots(1, len(shown) + 1)
-        for axes, (name, factor, label) in zip(panels, shown, strict=True):
+    with drawing(WIDTH, 3.3) as figure:
+        panels = figure.subplots(3, 2, sharex=True).ravel()
+        for axes, (name, factor, label) in zip(panels, shown, strict=False):
             values = factor * counts[name]
             for each in values if len(values) > 1 else ():
-                axes.plot(times, each, color="0.8", linewidth=0.7)
-            axes.plot(times, mean(values), color="#0072B2")
+                axes.plot(times, each, color="0.75", linewidth=0.7, label="a swarm")
+            axes.plot(times, mean(values), color="#0072B2", label="mean")
             set_time_panel(axes, label)
-        if len(values) > 1:
-            panels[0].plot([], [], color="0.8", linewidth=0.7, label="a swarm")
-            panels[0].plot([], [], color="#0072B2", label="mean")
-            panels[0].legend()
-        draw_bonds(last, results)
+        draw_bonds(panels[4], results)
+        for axes in panels[3:5]:
+            axes.set_xlabel("time [s]")
+            axes.xaxis.set_tick_params(labelbottom=True)
+        lines = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))
+        handles = [*(lines.values() if len(values) > 1 else ()), *panels[4].collections]
+        place_legend(figure, {"": handles}, panels[5])
+        if np.any(counts["percolating"] > 0.0):
+            add_foot(figure, "Radii of gyration: of clusters that do not percolate.")
         return figure
 
 
 def set_time_panel(axes, title):
-    axes.set(xlabel="time [s]")
-    axes.set_title(title, fontsize=8.0)
+    axes.set_title(title)
     axes.set_ylim(bottom=0.0)
 
 
@@ -108,27 +113,26 @@ def draw_bonds(axes, results):
         axes.fill_between(times, below, level, color=colour, label=word, linewidth=0.0)
         below = level
     set_time_panel(axes, "bonds")
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def sizes(results: SwarmResults) -> Figure:
     """Share of bodies in clusters of each size or less, at several times, all swarms together."""
     labels, times = results.groups["snapshots"]["cluster"], results.scales["time"]
-    chosen = places_shown(results, SNAPSHOTS + 1)
-    with drawing(4.4, 2.6) as figure:
-        axes = figure.subplots()
-        for colour, place in zip(graded_colours(len(chosen)), chosen, strict=True):
+    chosen = places_shown(results, SNAPSHOTS)
+    with drawing(WIDTH, 1.9) as figure:
+        axes, colours = figure.subplots(), graded_colours(len(chosen))
+        for index, place in enumerate(chosen):
             inside = [each[each >= 0] for each in labels[:, place]]
             found = np.concatenate([np.bincount(own)[own] for own in inside])
             values, number = np.unique(found, return_counts=True)
             share = np.cumsum(number) / number.sum()
             ends, shares = np.append(values, values[-1] * 1.3), np.append(share, 1.0)
-            axes.step(ends, shares, where="post", color=colour, label=f"{times[place]:.4g} s")
+            look = {"color": colours[index], "marker": marker(index)}
+            axes.step(ends, shares, where="post", **look)
         axes.set(xscale="log", ylim=(0.0, 1.03), xlabel="bodies in the cluster",
                  ylabel="share of bodies in clusters\nup to that size")  # fmt: skip
         set_log_axis(axes.xaxis)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+        place_legend(figure, {"time": line_handles(times_in_words(times[chosen]), colours)})
         return figure
 
 
@@ -137,21 +141,25 @@ def speed(results: SwarmResults) -> Figure:
     found, times = results.groups["clusters"], results.scales["time"]
     chosen = places_shown(results, SNAPSHOTS)
     shown = (found["cluster_gyration"] > 0.0) & (found["cluster_speed"] > 0.0)
-    with drawing(4.4, 2.8) as figure:
-        axes = figure.subplots()
-        for colour, place in zip(graded_colours(len(chosen)), chosen, strict=True):
+    with drawing(WIDTH, 2.1) as figure:
+        axes, colours = figure.subplots(), graded_colours(len(chosen))
+        for index, place in enumerate(chosen):
             rows = shown & (found["cluster_time"] == place)
             size, fall = MICRO * found["cluster_gyration"][rows], 1e3 * found["cluster_speed"][rows]
-            axes.plot(size, fall, "o", color=colour, ms=3.0, label=f"{times[place]:.4g} s")
+            axes.plot(size, fall, marker(index), color=colours[index], ms=2.5)
         axes.set(xlabel="radius of gyration [µm]", ylabel="settling [mm/s]")
         if shown.any():
             axes.set(xscale="log", yscale="log")
             set_log_axis(axes.xaxis)
             set_log_axis(axes.yaxis)
-        endless = np.isnan(found["cluster_gyration"]).any()
-        title = "of those that\ndo not percolate" if endless else None
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title=title)
+        place_legend(figure, {"time": line_handles(times_in_words(times[chosen]), colours)})
+        if np.isnan(found["cluster_gyration"]).any():
+            add_foot(figure, "Clusters that do not percolate.")
         return figure
+
+
+def times_in_words(times):
+    return [f"{time:.4g} s" for time in times]
 
 
 def classes(results: SwarmResults) -> Figure:
@@ -162,14 +170,14 @@ def classes(results: SwarmResults) -> Figure:
         f"from {a:.4g} µm" if b is None else (f"{a:.4g} to {b:.4g} µm" if a else f"to {b:.4g} µm")
         for a, b in zip(low, [*low[1:], None], strict=True)
     ]
-    with drawing(4.8, 2.6) as figure:
-        axes = figure.subplots()
-        for colour, word, each in zip(graded_colours(len(low)), words, numbers.T, strict=True):
-            axes.plot(times, each, color=colour, label=word if len(low) > 1 else "all")
+    with drawing(WIDTH, 1.9) as figure:
+        axes, colours = figure.subplots(), graded_colours(len(low))
+        for index, each in enumerate(numbers.T):
+            axes.plot(times, each, color=colours[index], marker=marker(index), markevery=0.2)
         axes.set(xlabel="time [s]", ylabel="clusters in the box")
         axes.set_ylim(bottom=0.0)
         title = r"$r_\mathrm{eq} = \sqrt{A/\pi}$"
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title=title, alignment="left")
+        place_legend(figure, {title: line_handles(words if len(low) > 1 else ["all"], colours)})
         return figure
 
 
@@ -250,7 +258,7 @@ def draw_bodies(axes, results, replicate, place, outlines=None):
     axes.add_collection(PathCollection(paths, facecolors=shades, edgecolors="0.25", lw=0.2))
     high = MICRO * height
     low = 0.0 if "y" in repeats else max(min([0.0, *lowest]), -0.1 * high)
-    axes.set(xlim=(0.0, MICRO * width), ylim=(low, high), aspect="equal", xlabel="x [µm]")
+    axes.set(xlim=(0.0, MICRO * width), ylim=(low, high), aspect="equal")
     for spine in axes.spines.values():
         spine.set_visible(True)
 
@@ -272,7 +280,8 @@ def write_swarm_animation(
         with drawing(4.0, min(max(4.0 * height / width, 2.0), 8.0) + 0.3) as figure:
             axes = figure.subplots()
             draw_bodies(axes, results, replicate, place, outlines)
-            axes.set(ylabel="y [µm]", title=f"{results.scales['time'][place]:.4g} s")
+            time = results.scales["time"][place]
+            axes.set(xlabel="x [µm]", ylabel="y [µm]", title=f"{time:.4g} s")
             figure.canvas.draw()
             pictures.append(frame_of(figure))
     save_gif(path, pictures, MILLISECONDS, rule)

@@ -84,14 +84,20 @@ SOURCE = ("shapes", "preset", "flocsim_version")
 """Names in the group ``run`` of what the source line is made of."""
 
 
-def source_line(run: Mapping[str, Any]) -> str:
-    """Return which flocs, preset and version results are of, as far as the group ``run`` says it.
+def source_line(run: Mapping[str, Any], counts: Sequence[int] = ()) -> str:
+    """Return which preset, flocs, replicates and version results are of, as far as it is known.
 
-    >>> source_line({"shapes": "12 flocs of shapes.h5", "preset": "si", "flocsim_version": "0.2.0"})
-    '12 flocs of shapes.h5 · preset si · flocsim 0.2.0'
+    ``run``: the group; ``counts``: numbers of replicates of the conditions.
+
+    >>> run = {"shapes": "12 flocs of shapes.h5", "preset": "si", "flocsim_version": "0.2.0"}
+    >>> source_line(run, [60, 60])
+    'preset si · 12 flocs of shapes.h5 · n = 60 · flocsim 0.2.0'
     """
-    forms = zip(SOURCE, ("{}", "preset {}", "flocsim {}"), strict=True)
-    return " · ".join(form.format(run[name]) for name, form in forms if run.get(name))
+    least, most = (min(counts), max(counts)) if len(counts) else ("", "")
+    n = f"{least}" if least == most else f"{least} to {most}"
+    forms = {"preset {}": run.get("preset"), "{}": run.get("shapes"), "n = {}": n,
+             "flocsim {}": run.get("flocsim_version")}  # fmt: skip
+    return " · ".join(form.format(value) for form, value in forms.items() if value)
 
 
 PACKAGES = ("flocsim", "numpy", "numba", "h5py")

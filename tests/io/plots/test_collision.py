@@ -131,7 +131,7 @@ def test_a_strip_names_bodies_lines_and_contacts():
     [legend] = figure.legends
     words = [text.get_text() for text in legend.get_texts()]
     assert words[:2] == ["body i", "body j"] and words[-1] == "contact"
-    assert words[2] == "path of a body's centre, whole run, seen from i"
+    assert words[2] == "path of the centre seen from i"
     assert [text.get_text() for text in figure.axes[0].texts[-2:]] == ["i", "j"]
     rings = [line for line in figure.axes[2].lines if line.get_marker() == "o"]
     assert [len(ring.get_xdata()) for ring in rings] == [2]

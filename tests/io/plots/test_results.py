@@ -15,8 +15,13 @@ from tests.helpers.synthetic_results import bonds_of, make_results
 from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
 
-OF_COLLISIONS = ("4", "5", "6", "8", "bonds", "delta", "overview")
+OF_COLLISIONS = ("4", "5", "6", "8", "delta", "overview")
 """Figures that have nothing to show where bodies miss each other."""
+
+
+def panels(figure):
+    """The panels of a figure, without the place of the grid in which its legend stands."""
+    return [axes for axes in figure.axes if axes.axison]
 
 
 def texts(axes):
@@ -56,13 +61,13 @@ def with_outcomes(results, outcome, inside):
 
 def test_figure_4_shows_every_probability_and_interval():
     results = make_results()
-    panels = figure_4(results).axes
-    assert [axes.get_title("left") for axes in panels] == [
+    shown = panels(figure_4(results))
+    assert [axes.get_title("left") for axes in shown] == [
         "(a) Type I",
         "(b) Type II",
         "(c) Type III",
     ]
-    for number, axes in enumerate(panels):
+    for number, axes in enumerate(shown):
         lines = bars(axes)
         assert len(lines) == 5
         for index, line in enumerate(lines):
@@ -74,7 +79,7 @@ def test_figure_4_shows_every_probability_and_interval():
 def test_outer_bars_have_the_numerical_error_on_either_side():
     results = make_results()
     table = results.probabilities
-    for number, axes in enumerate(figure_4(results).axes):
+    for number, axes in enumerate(panels(figure_4(results, numerics=True))):
         lines = outer(axes)
         assert len(lines) == 5
         for index, (low, high) in enumerate(lines):
@@ -83,6 +88,28 @@ def test_outer_bars_have_the_numerical_error_on_either_side():
             least, most = ends
             np.testing.assert_allclose(low, np.maximum(least - error, 0.0), atol=1e-12)
             np.testing.assert_allclose(high, np.minimum(most + error, 1.0), atol=1e-12)
+
+
+def quiet(results):
+    """The same results with a numerical error that is small beside the sampling error."""
+    small = {name: 0.01 * each for name, each in results.probabilities.items()
+             if name.endswith("_numerical")}  # fmt: skip
+    return attrs.evolve(results, probabilities=results.probabilities | small)
+
+
+def test_a_small_numerical_error_is_drawn_on_request_only():
+    for draw in (figure_4, figure_8, FIGURES["delta"], FIGURES["overview"]):
+        results = quiet(make_results())
+        plain, asked = draw(results), draw(results, numerics=True)
+        assert not any(map(outer, panels(plain))) and any(map(outer, panels(asked)))
+        notes = [figure._supxlabel.get_text().replace("\n", " ") for figure in (plain, asked)]
+        assert ["numerical error" in note for note in notes] == [False, True]
+
+
+def test_a_large_numerical_error_is_drawn_and_said():
+    figure = figure_4(make_results())
+    assert any(map(outer, panels(figure)))
+    assert "large somewhere" in figure._supxlabel.get_text().replace("\n", " ")
 
 
 def test_without_second_runs_there_are_no_outer_bars():
@@ -96,7 +123,7 @@ def test_without_second_runs_there_are_no_outer_bars():
 def test_figure_8_pools_the_counts_of_all_displacements():
     results = make_results()
     counts = results.probabilities["n_class"].sum(axis=2)
-    for number, axes in enumerate(figure_8(results).axes):
+    for number, axes in enumerate(panels(figure_8(results))):
         for index, (value, low, high) in enumerate(bars(axes)):
             successes, trials = counts[number, :, index], counts[number].sum(axis=-1)
             np.testing.assert_allclose(value, successes / trials)
@@ -106,25 +133,20 @@ def test_figure_8_pools_the_counts_of_all_displacements():
 def test_bonds_are_shares_of_the_aggregations():
     results = make_results()
     counts = results.probabilities["n_bond"].sum(axis=2)
-    drawn = {
-        "bonds": FIGURES["bonds"](results).axes,
-        "overview": FIGURES["overview"](results).axes[-3:],
-    }
-    for name, panels in drawn.items():
-        for number, axes in enumerate(panels):
-            lines = bars(axes)
-            assert len(lines) == 3, name
-            for index, (value, low, high) in enumerate(lines):
-                trials = counts[number].sum(axis=-1)
-                np.testing.assert_allclose(value, counts[number, :, index] / trials)
-                assert (low <= value).all() and (value <= high).all()
+    for number, axes in enumerate(FIGURES["overview"](results).axes[-3:]):
+        lines = bars(axes)
+        assert len(lines) == 3
+        for index, (value, low, high) in enumerate(lines):
+            trials = counts[number].sum(axis=-1)
+            np.testing.assert_allclose(value, counts[number, :, index] / trials)
+            assert (low <= value).all() and (value <= high).all()
 
 
-def test_without_its_rows_a_file_gives_the_same_bonds():
+def test_without_its_rows_a_file_gives_the_same_shares():
     results = make_results()
     for one, other in zip(
-        FIGURES["bonds"](results).axes,
-        FIGURES["bonds"](attrs.evolve(results, replicates=None, count=results.count)).axes,
+        FIGURES["overview"](results).axes,
+        FIGURES["overview"](attrs.evolve(results, replicates=None, count=results.count)).axes,
         strict=True,
     ):
         for mine, theirs in zip(bars(one), bars(other), strict=True):
@@ -151,7 +173,7 @@ def test_replicates_that_agree_at_all_displacements_count_once():
 @pytest.mark.parametrize("name", rest_slow(OF_COLLISIONS, lambda name: name == "4"))
 def test_nothing_but_misses_gives_figures_that_say_so(name, tmp_path):
     figure = FIGURES[name](with_outcomes(make_results(), 4, 255))
-    assert name == "outcomes" or all("no " in texts(axes) for axes in figure.axes)
+    assert name == "outcomes" or all("no " in texts(axes) for axes in panels(figure))
     save(figure, tmp_path / "empty.png")
 
 
@@ -181,7 +203,7 @@ def test_any_number_of_conditions_can_be_drawn(name, number):
     figure = FIGURES[name](results)
     figure.canvas.draw()
     if name in OF_COLLISIONS or name == "size":  # others need not have a panel for each type
-        assert len([axes for axes in figure.axes if axes.get_visible()]) in (
+        assert len([axes for axes in panels(figure) if axes.get_visible()]) in (
             len(results.vertices) if name == "size" else len(results.types),
             4 * len(results.types),
         )
@@ -203,8 +225,9 @@ def pooled_sizes():
 
 def test_sizes_are_a_numeric_axis():
     figure = against_size(pooled_sizes())
-    sphere, eight, bar = figure.axes
-    assert sphere.get_xscale() == "log" and "receiving" in bar.get_ylabel()
+    sphere, eight = figure.axes
+    [legend] = figure.legends
+    assert sphere.get_xscale() == "log" and "receiving" in legend.get_title().get_text()
     assert (sphere.get_title(loc="left"), eight.get_title(loc="left")) == ("sphere", "$N$ = 8")
     lines = [container.lines[0].get_xydata() for container in eight.containers]
     np.testing.assert_allclose(lines[0], [[6.0, 0.4], [8.0, 0.2]])
@@ -228,7 +251,7 @@ def test_points_of_few_trials_are_hollow():
     counts = results.probabilities["n_collided"].copy()
     counts[1, 2, 3] = FEW - 1
     made = attrs.evolve(results, probabilities=results.probabilities | {"n_collided": counts})
-    found = [hollows(axes) for axes in figure_4(made).axes]
+    found = [hollows(axes) for axes in panels(figure_4(made))]
     assert [len(each) for each in found] == [0, 1, 0]
     assert found[1][0].get_ydata() == results.probabilities["pr_inside"][1, 2, 3]
 

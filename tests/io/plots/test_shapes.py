@@ -52,8 +52,8 @@ def test_both_ways_to_count_add_up_to_1():
 
 def test_scaled_copies_of_one_outline_have_the_dimension_1():
     entries = [entry(r, {1: 35.0, 8: 9.0}) for r in np.geomspace(500.0, 5000.0, 6)]
-    words = [text.get_text() for text in shape(entries).axes[3].get_legend().get_texts()]
-    assert words[0] == "disc" and words[1].startswith("$D_{f2}$ = 1.00 ± 0.0")
+    title = shape(entries).axes[3].get_title(loc="left")
+    assert title.startswith("$D_{f2}$ = 1.00 ± 0.0")
 
 
 def test_a_floc_counts_once_whatever_its_spheroradii():
