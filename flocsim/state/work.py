@@ -137,8 +137,7 @@ class Work(NamedTuple):
     kick: KickTime
     cluster: Annotated[np.ndarray, ("n",), np.int64]  # first body of those that act on each other
     jacobian: Annotated[np.ndarray, (2, "blocks", 3, 3)]  # 3 × 3 blocks, see rhs.blocks
-    # Right-hand sides, then solutions; behind them, what is left of the momentum balances.
-    loads: Annotated[np.ndarray, (2, "unknowns"), complex]
+    loads: Annotated[np.ndarray, (2, "unknowns"), complex]  # right-hand sides, then solutions
     elimination: Elimination  # linear systems of a step
     candidates: Annotated[np.ndarray, ("rows",), Candidate]
     geometry: Annotated[np.ndarray, (STATES, "rows"), VertexAtEdge]
@@ -212,7 +211,7 @@ def work_of(
     room = min(BLOCKS_A_BODY * n, n * (n - 1)) if blocks is None else blocks
     work: Work = zeros_of(
         Work,
-        n=n, after=n + 1, unknowns=6 * n, few=few, rows=capacity, room=room,
+        n=n, after=n + 1, unknowns=3 * n, few=few, rows=capacity, room=room,
         pieces=len(scene.pieces) + 1, features=len(scene.vertices) + 1,
         **sizes_of_pairs(n, pairs, room),
     )._replace(rules=gauss_rules())  # fmt: skip
@@ -223,7 +222,7 @@ def work_of(
 def sizes_of_pairs(n: int, pairs: int, room: int) -> dict[str, int]:
     """Return the sizes that follow from the room for pairs of bodies, and for sparse blocks."""
     return {
-        "pairs": pairs, "blocks": 2 * n + 2 * pairs, "sparse": 2 * n + room,
+        "pairs": pairs, "blocks": 2 * n + 2 * pairs, "sparse": n + room,
     }  # fmt: skip
 
 

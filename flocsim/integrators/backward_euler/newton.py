@@ -24,7 +24,7 @@ from flocsim.integrators.backward_euler.contact_mean import (
     takes_part,
 )
 from flocsim.integrators.radau.contact_frames import gather_clusters
-from flocsim.integrators.radau.elimination import solve_balanced
+from flocsim.integrators.radau.elimination import solve_blocks
 from flocsim.integrators.radau.systems import factorise_euler
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.error import ITERATION_TOLERANCE, end_of_run, rounding_error
@@ -178,7 +178,7 @@ def solve_change(scene, work, step):
     """Write Newton's change of the velocities to CHANGE; return the largest resulting displacement
     [m]."""
     write_residual(scene, work, step)
-    solve_balanced(work, False)
+    solve_blocks(work, False)
     work.tally.solves += 1
     largest = 0.0
     for body in range(work.poses.shape[0]):

@@ -12,9 +12,8 @@ rounding error of (ω0 h)⁴, its quotient that of (ω0 h)² (Higham, Accuracy a
 Algorithms, 2002, section 13.3).
 
 The rows of x and y of a cluster's first body are the sums over all its bodies (momentum balance).
-Mutual forces cancel in these sums and are never written. These rows are eliminated last, and what
-rounding leaves of them is removed after the solution. Momentum is kept to rounding for both
-reasons.
+Mutual forces cancel in these sums and are never written. Momentum is kept to rounding for that
+reason.
 """
 
 import math
@@ -28,10 +27,9 @@ from flocsim.state.work import DAMPING, STIFFNESS
 
 REAL_PART, COMPLEX_RE, COMPLEX_IM = range(3)
 """Parts of ``blocks``: the real system, real and imaginary part of the complex system. Each part
-holds the n diagonal blocks in elimination order, factorised in the end, then each body's part of
-its cluster's momentum balance, then the other blocks in the order of ``column``. A row of a block
-is three numbers and a zero: processors that work on four numbers at once then do (.38 ms for 583
-bodies, .52 ms with rows of three)."""
+holds the n diagonal blocks in elimination order, factorised in the end, then the other blocks in
+the order of ``column``. A row of a block is three numbers and a zero: processors that work on four
+numbers at once then do (.38 ms for 583 bodies, .52 ms with rows of three)."""
 
 
 def slot_of(e, row, column):
@@ -51,12 +49,7 @@ def slot_of(e, row, column):
 
 def block_of(e, slot):
     """Return the index of the block of an entry of ``column``."""
-    return 2 * e.body.shape[0] + slot
-
-
-def balance_block(e, body):
-    """Return the index of the block of a body's part of its cluster's momentum balance."""
-    return e.body.shape[0] + body
+    return e.body.shape[0] + slot
 
 
 def stiffness_weights(step):
@@ -97,10 +90,9 @@ def write_momentum(scene, work, body, weights, step, both):
     leader, index = e.place[work.cluster[body]], e.place[body]
     # The row of the cluster's first body, and the column of this body.
     to = index if leader == index else block_of(e, slot_of(e, leader, index))
-    for block in (to, balance_block(e, body)):
-        # Only drag, walls and the like: forces within the cluster cancel in its momentum balance.
-        write_into(work, block, own_block(work, body), 0, 2, weights, both)
-        add_inertia(scene, work, block, body, 0, 2, step)
+    # Only drag, walls and the like: forces within the cluster cancel in its momentum balance.
+    write_into(work, to, own_block(work, body), 0, 2, weights, both)
+    add_inertia(scene, work, to, body, 0, 2, step)
 
 
 def write_coupling(work, body, other, block, weights, both):
@@ -119,7 +111,7 @@ def write_systems(scene, work, step, both):
     n = work.poses.shape[0]
     # Clear all blocks, those of fill-in, too.
     for part in range(3 if both else 1):
-        for block in range(block_of(e, e.lower[n])):
+        for block in range(n + e.lower[n]):
             for i in range(3):
                 for j in range(4):
                     e.blocks[part, block, i, j] = 0.0
@@ -269,12 +261,6 @@ def swap_columns(e, which, block, above):
             swap(e.blocks, which, block, i, k, i, e.pivots[which, above, k])
 
 
-def reciprocal(value):
-    """Return 1/value of a complex number, without the slow complex division."""
-    size = value.real * value.real + value.imag * value.imag
-    return complex(value.real / size, -value.imag / size)
-
-
 def factorise_diagonal(e, which, block):
     """Replace a diagonal block of a system by its factors L U; return False if it is singular, or
     too large for that.
@@ -293,10 +279,10 @@ def factorise_diagonal(e, which, block):
         size = value.real * value.real + value.imag * value.imag
         if not 0.0 < size < math.inf:
             return False
-        inverse = reciprocal(value)
-        put_number(m, which, block, k, k, inverse)
+        reciprocal = complex(value.real / size, -value.imag / size)
+        put_number(m, which, block, k, k, reciprocal)
         for i in range(k + 1, 3):
-            factor = number(m, which, block, i, k) * inverse
+            factor = number(m, which, block, i, k) * reciprocal
             put_number(m, which, block, i, k, factor)
             for j in range(k + 1, 3):
                 rest = number(m, which, block, i, j) - factor * number(m, which, block, k, j)
@@ -404,49 +390,3 @@ def solve_blocks(work, both):
             substitute_row(e, loads, index, e.upper[index], e.lower[index + 1], both)
             for which in range(2 if both else 1):
                 divide_load(e, loads, which, index, 3 * body)
-
-
-def keep_balances(work, systems):
-    """Copy the loads of the momentum balances behind all others, as solutions overwrite them."""
-    loads, n = work.loads, work.poses.shape[0]
-    for which in range(systems):
-        for row in range(0, 3 * n, 3):
-            loads[which, 3 * n + row] = loads[which, row]
-            loads[which, 3 * n + row + 1] = loads[which, row + 1]
-            # The third number is for the coefficient of the cluster as a whole.
-            loads[which, 3 * n + row + 2] = 0.0
-
-
-def restore_momentum(work, systems):
-    """Shift each cluster as a whole by what rounding has left of its momentum balance."""
-    e, loads, n = work.elimination, work.loads, work.poses.shape[0]
-    for body in range(n):
-        block, row = balance_block(e, body), 3 * (n + work.cluster[body])
-        subtract_real(e, loads, block, row, 3 * body)
-        if systems == 2:
-            subtract_complex(e, loads, block, row, 3 * body)
-        for which in range(systems):
-            # The mean of both directions is exact without drag, and close with it. Where a wall is
-            # stiff in one of them, what is left may stay, but never grows.
-            total = number(e.blocks, which, block, 0, 0) + number(e.blocks, which, block, 1, 1)
-            loads[which, row + 2] += 0.5 * total
-    for body in range(n):
-        if e.place[body] != NONE:
-            row = 3 * (n + work.cluster[body])
-            for which in range(systems):
-                inverse = reciprocal(loads[which, row + 2])
-                for axis in range(2):
-                    loads[which, 3 * body + axis] += inverse * loads[which, row + axis]
-
-
-def solve_balanced(work, both):
-    """Replace the loads by the solution, and keep the momentum of each cluster to rounding.
-
-    Stiff loads lose digits on their way into the row of the momentum balance, which is eliminated
-    last. The balance itself has none of those loads, and a shift of all bodies of a cluster changes
-    none of its contacts.
-    """
-    systems = 2 if both else 1
-    keep_balances(work, systems)
-    solve_blocks(work, both)
-    restore_momentum(work, systems)

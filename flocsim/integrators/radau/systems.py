@@ -14,7 +14,7 @@ fill-in (elimination.py).
 
 from flocsim.compiler.linker import apart
 from flocsim.integrators.radau.contact_frames import add_shifts, force_at_start, velocity_at_stage
-from flocsim.integrators.radau.elimination import factorise_blocks, solve_balanced, solve_blocks
+from flocsim.integrators.radau.elimination import factorise_blocks, solve_blocks
 from flocsim.integrators.radau.tableau import (
     COMPLEX,
     EIGENVALUES,
@@ -70,7 +70,7 @@ def solve_prepared(scene, work):
 
 def solve_both(work):
     """Replace the loads of both systems by the solutions."""
-    solve_balanced(work, True)
+    solve_blocks(work, True)
 
 
 def momentum_rate(scene, work, body, axis, stage, step):
