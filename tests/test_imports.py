@@ -37,7 +37,7 @@ ROWS = [
     ["geometry"],
     ["hooks"],
     ["state"],
-    ["compiler", "fields", "water"],
+    ["compiler", "fields", "tasks", "water"],
     ["constants", "errors", "process"],
 ]
 

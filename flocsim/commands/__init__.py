@@ -1,5 +1,4 @@
-"""The subcommands of ``flocsim``, a file each; ``fit_pictures`` and ``processes`` are the work
-behind ``fit``.
+"""The subcommands of ``flocsim``, a file each; ``fit_pictures`` is the work behind ``fit``.
 
 The file of a command has ``add_arguments(parser)``, whose docstring is the command's help
 (`flocsim.io.arguments.document`), and ``run(arguments)``, which returns the exit code. Each has a

@@ -16,7 +16,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.commands.processes import Lost, workers
 from flocsim.errors import FileError, FlocsimError, ImageError, ShapeError, UsageError, plural
 from flocsim.geometry.fit.fit import Fit, fit_mask
 from flocsim.geometry.shapes.outline import ShapeMeasures
@@ -42,6 +41,7 @@ from flocsim.io.plots.review import review_page
 from flocsim.io.plots.shapes import draw_overlay, single_fit
 from flocsim.io.plots.style import save
 from flocsim.io.terminal import Progress
+from flocsim.tasks import Lost, workers
 
 Fits = dict[float, dict[int, Fit]]
 """The Fit of one mask at every spheroradius [px] and N."""

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.commands import add_allowed, add_overwrite, allowed_by
-from flocsim.commands.processes import Lost, attempt, workers
 from flocsim.commands.sweep import interrupt
 from flocsim.ensembles.cli import continuing
 from flocsim.errors import FlocsimError, UsageError
@@ -16,6 +15,7 @@ from flocsim.io.arguments import whole
 from flocsim.io.outputs import check_outputs
 from flocsim.io.seals import held
 from flocsim.process import STOPPED, handle
+from flocsim.tasks import Lost, attempt, workers
 
 WAYS = "continue it with --resume, or add --overwrite, which keeps the old one under another name"
 

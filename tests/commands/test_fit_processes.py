@@ -14,9 +14,9 @@ from PIL import Image
 
 from flocsim.__main__ import main
 from flocsim.commands import fit_pictures
-from flocsim.commands.processes import Lost, workers
 from flocsim.errors import UsageError
 from flocsim.io.shape_library import read_library
+from flocsim.tasks import Lost, workers
 from tests.helpers.small_study import ROOT
 from tests.helpers.tiers import rest_slow
 from tests.helpers.waiting import PATIENCE, wait_until
@@ -169,7 +169,7 @@ def test_an_interrupt_ends_the_processes_at_once(interruptible):
 def test_processes_end_with_their_parent(tmp_path):
     code = (
         "import os, time\n"
-        "from flocsim.commands.processes import workers\n"
+        "from flocsim.tasks import workers\n"
         "def where(number):\n"
         "    if number < 2:\n"
         "        os.write(1, b'%d\\n' % os.getpid())  # at once, unlike print\n"

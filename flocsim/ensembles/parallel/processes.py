@@ -201,7 +201,8 @@ def in_copies(works: Sequence[Callable[[], object]]) -> None:
     they take of memory is given back. Nothing fails: who needs what a work leaves does it again.
     The first one alone says something. Where processes cannot be copied this one does the work.
     """
-    if sys.platform != "linux":
+    # The processes of --jobs are daemons, which multiprocessing gives no children.
+    if sys.platform != "linux" or multiprocessing.current_process().daemon:
         for work in works:
             work()
         return

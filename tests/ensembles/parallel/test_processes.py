@@ -1,6 +1,7 @@
 """What copies of the process do for it."""
 
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -42,6 +43,17 @@ def test_works_are_done_in_other_processes_by_the_end(tmp_path):
 
 def leave(path):
     path.write_text(str(os.getpid()))
+
+
+def test_a_process_that_may_have_no_children_does_the_works_itself(tmp_path):
+    # As the processes of --jobs, where the engine is not compiled yet.
+    context = multiprocessing.get_context("fork")
+    work = partial(leave, tmp_path / "done")
+    process = context.Process(target=in_copies, args=([work],), daemon=True)
+    process.start()
+    process.join(PATIENCE)
+    assert process.exitcode == 0
+    assert (tmp_path / "done").read_text() == str(process.pid)
 
 
 def test_the_first_one_speaks_and_how_a_work_fails_is_not_told(capfd):
