@@ -62,6 +62,7 @@ def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
         title = f"{len(sizes)} flocs, {sizes.min():.3g} to {sizes.max():.3g} µm"
         axes.set(xlabel=r"equivalent radius $r_\mathrm{eq}$ [µm]", ylabel="number of flocs",
                  title=title, xlim=(0.0, None))  # fmt: skip
+        axes.yaxis.get_major_locator().set_params(integer=True)
         style.place_legend(figure, {"": axes.get_legend_handles_labels()[0]})
         return figure
 
