@@ -86,7 +86,7 @@ def core_distance(point, vertices):
 
 def make_body(vertices, radius, cells=200):
     """Return the Body with this core and spheroradius; area and moments are sums over a grid."""
-    vertices = np.array(vertices, complex)
+    vertices = np.array(vertices, complex) - np.mean(vertices)
     reach = abs(vertices).max() + 1.1 * radius
     x, size = np.linspace(-reach, reach, cells, retstep=True)
     points = (x + 1j * x[:, None]).ravel()
@@ -98,7 +98,9 @@ def make_body(vertices, radius, cells=200):
     second_moment = area * np.average(abs(points - centroid) ** 2, weights=covered)
     mass, inertia = SURFACE_DENSITY * area, SURFACE_DENSITY * second_moment
     outer = abs(vertices - centroid).max() + radius
-    return Body(vertices - centroid, radius, mass, inertia, sqrt(area / pi), outer)
+    # Of a sphere exactly: its attraction at contact falls off within nanometres.
+    r_eq = radius if len(vertices) == 1 else sqrt(area / pi)
+    return Body(vertices - centroid, radius, mass, inertia, r_eq, outer)
 
 
 # --- Forces between the two -------------------------------------------------------------------

@@ -183,8 +183,7 @@ def minimal():
 @pytest.mark.slow
 def test_all_its_spheres_stick(minimal, capsys):
     minimal.main(pairs=2, corners=1)
-    _, *lines = capsys.readouterr().out.splitlines()
-    assert [line.split(":")[1].split() for line in lines] == 3 * [["A", "A", "Pr[A]", "=", "2/2"]]
+    assert capsys.readouterr().out.count("A A   Pr[A] = 2/2") == 3
 
 
 TYPES, VERTICES, DELTA = ("I", "II", "III"), (4, 16, 64), (0.0, 0.4, 0.8)
