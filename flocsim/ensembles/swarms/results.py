@@ -142,7 +142,7 @@ def facts_of(results: SwarmResults) -> Facts:
     events = results.groups["events"]
     before, after = events["event_before"], events["event_after"]
     return [
-        ("swarms", f"{len(radii)} of {plural(np.count_nonzero(free), 'body', 'bodies')}, "
+        ("swarms", f"{len(radii)} of {plural(int(free.sum()), 'body', 'bodies')}, "
          f"{int(ends['finished'].sum())} completed"),
         ("r_eq [um]", f"{radii.min():.4g} to {radii.max():.4g}, median {np.median(radii):.4g}"),
         ("box [um]", f"{width:.5g} x {height:.5g}"),
