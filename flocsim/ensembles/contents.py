@@ -276,7 +276,7 @@ def open_any(
 
     Returns
     -------
-    StudyResults, SwarmResults, SweepResults, Trajectory or another class
+    StudyResults, SwarmResults, SweepResults or another class
         Depends on the kind of file. Replicates of pairs are read when first used.
 
     Raises
@@ -286,7 +286,7 @@ def open_any(
 
     Notes
     -----
-    Opening a file never runs code that the file names.
+    Opening a file runs no code unless ``folder`` or ``own`` allows it.
     """
     own = [own] if isinstance(own, str) else own
     kind, file = open_kind(path)

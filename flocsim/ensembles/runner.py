@@ -61,8 +61,8 @@ def run(config: Config) -> Any:
 
     Returns
     -------
-    StudyResults, SwarmResults or another class, or None
-        None if a signal stopped the study.
+    Results, SwarmResults or another class, or None
+        Depends on the kind of study; None if a signal stopped it.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "results.h5")

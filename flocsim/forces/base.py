@@ -42,12 +42,29 @@ class Force(ABC):
         return ""
 
     def kernel_in(self, fluid: Fluid) -> Callable:
-        """Return the kernel to use in this fluid; a subclass may choose a cheaper one for some
-        fluids."""
+        """Return the kernel to use in a fluid; a subclass may choose a cheaper one for some fluids.
+
+        Parameters
+        ----------
+        fluid : Fluid
+
+        Returns
+        -------
+        callable
+        """
         return self.kernel
 
     def remarks(self, fluid: Fluid) -> list[str]:
-        """Return short remarks on this force in this fluid, for System.explain()."""
+        """Return short remarks on this force in a fluid, for System.explain().
+
+        Parameters
+        ----------
+        fluid : Fluid
+
+        Returns
+        -------
+        list of str
+        """
         return []
 
     @property
