@@ -70,7 +70,9 @@ def test_the_page_has_every_region_and_loads_nothing(page):
 def test_the_command_says_how_to_go_on(folder, capsys):
     assert fit(folder, "--review") == 0
     last = capsys.readouterr().out.splitlines()[-1]
-    assert last.startswith(f"{folder / 'c-review.html'}: choose flocs on it, save the choices")
+    assert last.startswith(
+        f"{folder / 'c-review.html'}: choose flocs on this page, save the choices"
+    )
     assert "--reviewed reviewed.json --overwrite" in last
 
 
