@@ -287,13 +287,31 @@ def origin(run: Mapping[str, Any], apart: Collection[str] = ()) -> Facts:
 def open_any(
     path: str | os.PathLike, folder: str | os.PathLike | None = None, own: Collection[str] = ()
 ) -> Any:
-    """Return what a file that flocsim wrote holds, checked; the table of replicates of pairs stays
-    on the disk until it is asked for.
+    """Open any file that flocsim wrote.
 
-    A file runs no code: for a study with a class of one's own, ``folder`` is where its module
-    lies (and the study's shape library; default: that is looked for beside the results, and no
-    module is imported), ``own`` has the names of installed modules that may be imported, as
-    ``own=["mine"]``. FileError for a file that is absent, damaged, or of another kind.
+    Parameters
+    ----------
+    path : path
+        Name of the file.
+    folder : path, optional
+        Folder of the modules of the study's own classes, and of its shape library. By default the
+        library is looked for beside the results, and no module is imported.
+    own : collection of str
+        Names of installed modules that may be imported, as in ``own=["mine"]``.
+
+    Returns
+    -------
+    StudyResults, SwarmResults, SweepResults or another class
+        Depends on the kind of file. Replicates of pairs are read when first used.
+
+    Raises
+    ------
+    FileError
+        If the file is absent, damaged or of another kind.
+
+    Notes
+    -----
+    Opening a file runs no code unless ``folder`` or ``own`` allows it.
     """
     own = [own] if isinstance(own, str) else own
     kind, file = open_kind(path)
@@ -317,12 +335,20 @@ known."""
 
 @attrs.frozen(eq=False, repr=False)
 class Differences(Tables):
-    """What one file has more of than another: `flocsim.compare` makes it.
+    """Differences between two results, as `flocsim.compare` returns them.
 
-    ``axes`` {name: Column}: the conditions, or times, that both have; ``arrays`` {quantity: {name:
-    values}}, names as in MEANINGS, along them. ``paired``: whether replicate k is the same draw in
-    both, so that the difference is that of the ``pairs`` that both have; else samples are
-    independent. ``changes``: lines on what the studies differ in.
+    Attributes
+    ----------
+    paired : bool
+        Whether both studies drew the same replicates.
+    pairs : int
+        Number of replicates that both have, if paired.
+    axes : dict of str to Column
+        The conditions, or times, that both have.
+    arrays : dict of str to dict of str to array
+        {quantity: {name: values}} along these axes; the names are those of MEANINGS.
+    changes : tuple of str
+        Lines on the differences between the two studies themselves.
     """
 
     paired: bool
@@ -341,7 +367,22 @@ class Differences(Tables):
         return {name: list(self.axes) for name in self.quantities}
 
     def labelled(self, quantity: str) -> Labelled:
-        """Return the arrays of one quantity with their axes; UsageError for an unknown one."""
+        """Return the arrays of one quantity with their axes.
+
+        Parameters
+        ----------
+        quantity : str
+            Name of the quantity.
+
+        Returns
+        -------
+        Labelled
+
+        Raises
+        ------
+        UsageError
+            If there is no such quantity.
+        """
         unit, text = self.quantities[self.known(quantity)]
         columns = {
             name: Column(tuple(self.axes), values, {
@@ -352,10 +393,20 @@ class Differences(Tables):
         return Labelled(self.axes, columns, {self.word: text, "paired": int(self.paired)})
 
     def table(self, quantity: str | None = None, numerics: bool = False) -> str:
-        """Return the differences of one quantity, the first where none is named, as text.
+        """Return the differences of one quantity as text.
 
-        A star marks intervals, numerics included, without 0. ``numerics``: add by how much exact
-        runs would change each difference; also done where that exceeds half of an interval.
+        Parameters
+        ----------
+        quantity : str, optional
+            Name of the quantity; the first by default.
+        numerics : bool
+            Add how much each difference would change if all runs were exact. This is also added if
+            it exceeds half of an interval somewhere.
+
+        Returns
+        -------
+        str
+            A table; a star marks intervals, including the numerical error, that do not contain 0.
         """
         quantity = self.known(quantity)
         unit, text = self.quantities[quantity]
@@ -452,11 +503,23 @@ def common(ours: Any, theirs: Any, axis: str) -> list:
 
 
 def compare(first: Any, second: Any) -> Differences:
-    """What the second of two results has more of than the first, over the conditions that both
-    have; of swarms over the times.
+    """Compare two results, over the conditions (of swarms, the times) that both have.
 
-    They are paired where both have drawn the same replicates, one by one: studies of one seed.
-    UsageError where they have nothing in common, or are of two kinds.
+    Parameters
+    ----------
+    first, second : StudyResults or SwarmResults
+        Results of the same kind of study.
+
+    Returns
+    -------
+    Comparison or SwarmComparison
+        Differences, second minus first, with 95 % intervals. Replicates are paired if both studies
+        drew the same ones, that is, have the same seed.
+
+    Raises
+    ------
+    UsageError
+        If they have no condition in common, or are of two kinds.
     """
     name, other = (getattr(each, "format", "") for each in (first, second))
     if name == other and name in STUDIES and contents_of(name).compare is not None:

@@ -1,15 +1,14 @@
-"""What the machine knows of studies of any kind: their conditions, the chunks in which they are run
-and stored, and the contract of a kind, what differs between pairs, rates and swarms.
+"""The interface that every kind of study implements: pairs, kernels and swarms.
 
-A chunk is a run of replicates of one condition, the unit of handing out, writing and resuming. A
-row is what a finished replicate comes to, of the columns of its kind of study; those of pairs are
-ROW. What is saved of an unfinished one are its parts, by name. Replicates of one condition are
-kept as intervals: sorted, disjoint pairs [first, stop).
+A chunk is a run of replicates of one condition, the unit that is assigned, written and resumed. A
+row holds the results of a finished replicate, in the columns of its kind of study; those of pairs
+are ROW. The saved parts of an unfinished replicate have names. Replicates of one condition are
+stored as intervals: sorted, disjoint pairs [first, stop).
 
-A kind gives a subclass of StudyKind, the conditions, draws and runs of its replicates, which every
-rank has, and Contents (`flocsim.ensembles.contents`), what becomes of the rows of a study and what
-commands show of its files. The journal, dealing to ranks and processes, resuming, identities,
-signals and progress exist once and ask these two. `kinds` has all of them, by their scenes.
+A kind provides a subclass of StudyKind, with the conditions, draws and runs of its replicates, on
+every rank; and Contents (`flocsim.ensembles.contents`), with the results made of its rows and the
+output of commands. The journal, distribution to ranks and processes, resuming, identities, signals
+and progress exist once and use these two. `kinds` lists all kinds by their scenes.
 """
 
 import json

@@ -52,10 +52,17 @@ class Ended:
 
 
 def run(config: Config) -> Any:
-    """Run a config's study in this process and return its results, all of them in memory.
+    """Run a config's study in this process, and return its results in memory.
 
-    They go through a file in a temporary folder, so that there is one way to run a study. None
-    where a signal has stopped it.
+    Parameters
+    ----------
+    config : Config
+        As from `load_config`.
+
+    Returns
+    -------
+    Results, SwarmResults or another class, or None
+        Depends on the kind of study; None if a signal stopped it.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "results.h5")

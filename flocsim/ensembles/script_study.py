@@ -106,12 +106,25 @@ MODES = ("new", "resume", "restart")
 
 
 class Study:
-    """All that a config file says, from a file or from a dict with the same keys.
+    """A study as a config file describes it.
 
-    Parameters: ``source``, the path of a TOML file or a nested dict; ``folder``, where a dict's
-    shape library and modules of one's own lie (default: the current one). Every value is checked as
-    in a file: ConfigError with one line per problem.
+    Parameters
+    ----------
+    source : path or mapping
+        A TOML file, or a nested dict with the same keys.
+    folder : path, optional
+        Folder of a dict's shape library and of the modules of your own classes; the current folder
+        by default.
 
+    Raises
+    ------
+    ConfigError
+        If a value is wrong; the message has one line per problem.
+    FileError
+        If the file cannot be read.
+
+    Examples
+    --------
     >>> study = Study({"preset": "tang2014", "replicates": 10, "shapes": {"vertices": [1]}})
     >>> study.with_(replicates=20).config.replicates
     20
@@ -139,11 +152,25 @@ class Study:
         self.config: Config = load_any_config(path, overrides, self.sources)
 
     def with_(self, changes: Mapping[str, Any] | None = None, /, **keys: Any) -> "Study":
-        """Return a Study with other values: a nested dict, dotted keys, or top-level keys by name.
+        """Return a Study with other values.
 
-        ``study.with_({"forces.contact.k_n": "10 N/m"}, seed=3, scene={"delta": [0.0]})``. Checked
-        like the file; a force is left out by False, as ``{"forces.double_layer": False}``. Modules
-        and libraries are those that this one has read.
+        Parameters
+        ----------
+        changes : mapping, optional
+            A nested dict, or {"forces.contact.k_n": "10 N/m"} with dotted keys; False leaves out a
+            force, as in ``{"forces.double_layer": False}``.
+        **keys
+            Top-level keys by name, as in ``seed=3`` or ``scene={"delta": [0.0]}``.
+
+        Returns
+        -------
+        Study
+            A new study; it uses the modules and libraries that this one has already read.
+
+        Raises
+        ------
+        ConfigError
+            If a value is wrong.
         """
         found: dict[str, Any] = {}
         for key, value in {**(changes or {}), **keys}.items():
@@ -161,15 +188,34 @@ class Study:
         self, jobs: int = 1, *, output: str | os.PathLike | None = None, mode: str = "new",
         overwrite: bool = False, quiet: bool = True,
     ) -> Any:  # fmt: skip
-        """Run all replicates that are missing and return the results, as `flocsim ensemble` does.
+        """Run all missing replicates, as `flocsim ensemble` does, and return the results.
 
-        ``jobs`` processes of this machine (without ``if __name__ == "__main__"``);
-        ``output``, instead of the config's file: where neither names one, results are in memory
-        alone, and nothing is kept of a run that is interrupted; ``mode``: "new", "resume" (go on,
-        extend, or take finished results as they are) or "restart"; ``overwrite``: keep a file that
-        is in the way under another name; ``quiet=False`` prints what the command prints. What is
-        finished is kept when it is interrupted: go on with ``mode="resume"``. UsageError
-        for a file in the way, FileError where it cannot be written.
+        Parameters
+        ----------
+        jobs : int
+            Number of processes on this machine; no ``if __name__ == "__main__"`` is needed.
+        output : path, optional
+            Results file, instead of the config's. If neither names one, results are in memory only,
+            and an interrupted run is lost.
+        mode : "new", "resume" or "restart"
+            "resume" continues an unfinished run, extends finished results, or returns them as they
+            are.
+        overwrite : bool
+            Whether to rename an existing file instead of raising UsageError.
+        quiet : bool
+            False prints what the command prints.
+
+        Returns
+        -------
+        StudyResults or SwarmResults
+            As from `flocsim.open`.
+
+        Raises
+        ------
+        UsageError
+            If a file is in the way, or belongs to another study.
+        FileError
+            If a file cannot be written.
         """
         if mode not in MODES:
             raise UsageError(f"mode must be one of {', '.join(MODES)}, found {mode!r}")
@@ -194,11 +240,17 @@ class Study:
 
     @property
     def names_output(self) -> bool:
-        """Return True if the config says where its results go."""
+        """True if the config names a results file."""
         return "file" in lay_over(parse(self.path, self.text), self.overrides).get("output", {})
 
     def check(self) -> None:
-        """Raise now what would keep the study from running: zone, sizes, forces, library."""
+        """Check the attraction zone, sizes, forces and shape library without running the study.
+
+        Raises
+        ------
+        UsageError
+            If the study cannot run.
+        """
         kind_of(self.config).check(self.config)
         study_of(self.config).prepare()
 
@@ -206,11 +258,28 @@ class Study:
         self, replicate: int = 0, type: str | None = None, vertices: int | None = None,
         delta: float | None = None,
     ) -> Trajectory:  # fmt: skip
-        """Run one replicate and keep its motion.
+        """Run one replicate, and return its motion.
 
-        Of a collision type (default: the first), with so many vertices (the last of the config) at
-        a displacement δ/δ_max (the first). The Trajectory's ``row`` has what the table of
-        replicates holds of it. UsageError for what the study does not have.
+        Parameters
+        ----------
+        replicate : int
+            Index of the replicate, from 0.
+        type : str, optional
+            Collision type; the first by default.
+        vertices : int, optional
+            N; the last by default.
+        delta : float, optional
+            Displacement δ/δ_max; the first by default.
+
+        Returns
+        -------
+        Trajectory
+            Its ``row`` has the row of the table of replicates, in words.
+
+        Raises
+        ------
+        UsageError
+            If the study has no such replicate, or is not a study of pairs.
         """
         if not isinstance(self.config.scene, PairScene):
             raise UsageError(

@@ -51,13 +51,36 @@ def sweep(
     mode: str = "new", overwrite: bool = False, quiet: bool = True,
     tell: Callable[[str], object] = lambda line: None,
 ) -> SweepResults:  # fmt: skip
-    """Run a Study at every value of some keys, and join the results in the file ``output``.
+    """Run a study at every value of some keys, and join the results in one file.
 
-    ``over``: {dotted key: values}; several keys make a grid. ``mode`` "resume" goes on with what is
-    there, extends it, or takes it as it is, as Study.run does with each part; ``tell`` is given a
-    line for each. All values have the study's seed: what differs between them is paired. UsageError
-    for a key that is none, a value that does not fit, a file in the way, and for a part that is, or
-    becomes, another than when it began.
+    Parameters
+    ----------
+    study : Study
+        The study; all values share its seed, so that replicates are paired.
+    over : mapping of str to sequence
+        {dotted key: values}; several keys make a grid.
+    output : path
+        Joined results file.
+    jobs : int
+        Number of processes on this machine.
+    mode : "new" or "resume"
+        "resume" continues, extends or reuses existing parts, as `Study.run` does.
+    overwrite : bool
+        Whether to rename an existing file instead of raising UsageError.
+    quiet : bool
+        False prints what the command prints.
+    tell : callable
+        Function that receives a line of text for each part.
+
+    Returns
+    -------
+    SweepResults
+
+    Raises
+    ------
+    UsageError
+        If a key is unknown, a value does not fit, a file is in the way, or a part belongs to
+        another study.
     """
     output = Path(output)
     parts = planned(study, over, output)

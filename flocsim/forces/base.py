@@ -23,8 +23,12 @@ from flocsim.fields import word_or_quantity
 class Force(ABC):
     """Base class of all forces.
 
+    Notes
+    -----
     Subclass one of its kinds (BodyForce, CentreForce, SurfaceForce, OutlineForce, OrientedForce or
-    ContactForce), and give it a static method ``kernel``.
+    ContactForce), decorate the class with ``attrs.frozen``, and give it a static method ``kernel``:
+    a plain function of a view of the bodies and of parameters named after fields of the force or of
+    the fluid.
     """
 
     @staticmethod
@@ -38,12 +42,29 @@ class Force(ABC):
         return ""
 
     def kernel_in(self, fluid: Fluid) -> Callable:
-        """Return the kernel to use in this fluid; a subclass may choose a cheaper one for some
-        fluids."""
+        """Return the kernel to use in a fluid; a subclass may choose a cheaper one for some fluids.
+
+        Parameters
+        ----------
+        fluid : Fluid
+
+        Returns
+        -------
+        callable
+        """
         return self.kernel
 
     def remarks(self, fluid: Fluid) -> list[str]:
-        """Return short remarks on this force in this fluid, for System.explain()."""
+        """Return short remarks on this force in a fluid, for System.explain().
+
+        Parameters
+        ----------
+        fluid : Fluid
+
+        Returns
+        -------
+        list of str
+        """
         return []
 
     @property
@@ -98,9 +119,12 @@ class PairForce(Force):
 
 @attrs.frozen
 class CentreForce(PairForce):
-    """A PairForce along the line of centres, as a function of the gap between equivalent spheres.
+    """A force along the line of centres, as a function of the gap between equivalent spheres.
 
-    It exerts no torque. ``pair`` is a PairView.
+    Notes
+    -----
+    ``kernel(pair, …) → repulsion`` [N], positive where it pushes the bodies apart; ``pair`` is a
+    PairView. The force exerts no torque. For ``slope`` and ``reach`` see PairForce.
     """
 
     acts_on = "centres"
@@ -108,10 +132,13 @@ class CentreForce(PairForce):
 
 @attrs.frozen
 class SurfaceForce(PairForce):
-    """A PairForce at the nearest points of two outlines, as a function of their smooth gap.
+    """A force at the nearest points of two outlines, as a function of their smooth gap.
 
-    The smooth gap is a soft minimum over all vertex–edge pairs (integrators/rhs/surface_gap.py).
-    ``pair`` is a PairView.
+    Notes
+    -----
+    ``kernel(pair, …) → repulsion`` [N], positive where it pushes the bodies apart; ``pair`` is a
+    PairView. The smooth gap is a soft minimum over all vertex–edge pairs
+    (integrators/rhs/surface_gap.py). For ``slope`` and ``reach`` see PairForce.
     """
 
     acts_on = "surfaces"

@@ -196,10 +196,23 @@ class Meeting:
         return 0.5 * (touching + passing)
 
     def settling(self, weights: tuple[float, float]) -> float:
-        """Return the collision efficiency (b_c/(r₁ + r₂))² of two settling spheres.
+        """Return the collision efficiency of two settling spheres.
 
-        It is the share of the cross section π (r₁ + r₂)² from which they come into contact.
-        ``weights``: buoyant weights of both [N]. Raises UsageError for equal settling speeds.
+        Parameters
+        ----------
+        weights : (float, float)
+            Buoyant weights of both spheres [N].
+
+        Returns
+        -------
+        float
+            (b_c/(r₁ + r₂))², the fraction of the cross section π (r₁ + r₂)² from which they come
+            into contact.
+
+        Raises
+        ------
+        UsageError
+            If both settle at the same speed.
         """
         loads = np.array(weights)
         alone = loads / np.array(self.pair.radii)
@@ -234,11 +247,25 @@ class Meeting:
         return float((high[0] ** 2 - low[0] ** 2) * math.exp(2.0 * before))
 
     def in_flow(self, flow: str, rate: float) -> float:
-        """Return the collision efficiency in a flow.
+        """Return the collision efficiency of two spheres in a flow.
 
-        It is the share of the rectilinear kernel, 4/3 G (r₁ + r₂)³ in shear or 8/3 s (r₁ + r₂)³ in
-        extension. ``flow``: "shear", u = (G y, 0, 0), or "extension", u = (s x, −s y, 0); ``rate``:
-        G or s [1/s]. Raises UsageError for others.
+        Parameters
+        ----------
+        flow : "shear" or "extension"
+            u = (G y, 0, 0), or u = (s x, −s y, 0).
+        rate : float
+            G or s [1/s].
+
+        Returns
+        -------
+        float
+            Fraction of the rectilinear kernel, 4/3 G (r₁ + r₂)³ in shear, 8/3 s (r₁ + r₂)³ in
+            extension.
+
+        Raises
+        ------
+        UsageError
+            If the flow is unknown, or the rate is not above 0.
         """
         nodes, weights = np.polynomial.legendre.leggauss(AZIMUTHS)
         angle, weight = 0.25 * math.pi * (nodes + 1.0), 0.25 * math.pi * weights
@@ -251,9 +278,24 @@ class Meeting:
         return float(np.sum(weight * 0.75 * (high**2 - low**2)))
 
     def widths(self, flow: str, rate: float, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the smallest and largest touching offsets (k,) over r₁ + r₂ in a flow.
+        """Return the smallest and largest offsets that lead to contact in a flow.
 
-        Offsets lie at an ``angle`` (k,) from the plane of shear or extension.
+        Parameters
+        ----------
+        flow, rate
+            As for `in_flow`.
+        angle : (k,) float array
+            Angle of the offset from the plane of shear or extension [rad].
+
+        Returns
+        -------
+        low, high : (k,) float arrays
+            Offsets over r₁ + r₂.
+
+        Raises
+        ------
+        UsageError
+            If the flow is unknown, or the rate is not above 0.
         """
         if flow not in FLOWS or not rate > 0.0:
             raise UsageError(

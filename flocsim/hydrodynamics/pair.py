@@ -94,7 +94,20 @@ class SpherePair:
         return scale * self.functions.function(family, on, of, 2.0 * gap / sum(self.radii))
 
     def along(self, gap: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Return (R (k, 2, 2) [N s/m], Γ (k, 2) [N s]) for velocities along n, and for E_nn."""
+        """Return the resistance to motion along the line of centres, n.
+
+        Parameters
+        ----------
+        gap : (k,) float array
+            Gap of the spheres [m], above 0.
+
+        Returns
+        -------
+        resistance : (k, 2, 2) float array
+            Force on each sphere per velocity of each along n [N s/m].
+        strain : (k, 2) float array
+            Force on each sphere per strain rate E_nn [N s].
+        """
         gap = positive_gaps(gap)
         resistance, strain = np.empty((len(gap), 2, 2)), np.zeros((len(gap), 2))
         for on in SPHERES:
@@ -106,9 +119,20 @@ class SpherePair:
         return resistance, strain
 
     def across(self, gap: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Return (R (k, 4, 4), Γ (k, 4)) for both velocities along t and both spins, and for E_nt.
+        """Return the resistance to motion across the line of centres, along t, and to rotation.
 
-        Forces [N] first, then torques [N m].
+        Parameters
+        ----------
+        gap : (k,) float array
+            Gap of the spheres [m], above 0.
+
+        Returns
+        -------
+        resistance : (k, 4, 4) float array
+            Forces [N] on both spheres, then torques [N m], per velocity of each along t and per
+            spin of each.
+        strain : (k, 4) float array
+            The same per strain rate E_nt.
         """
         gap = positive_gaps(gap)
         resistance, strain = np.empty((len(gap), 4, 4)), np.zeros((len(gap), 4))
@@ -124,7 +148,18 @@ class SpherePair:
         return resistance, strain
 
     def relative(self, gap: ArrayLike) -> "Relative":
-        """Return the relative motion of two spheres free of torques."""
+        """Return the relative motion of two spheres free of torques.
+
+        Parameters
+        ----------
+        gap : (k,) float array
+            Gap of the spheres [m], above 0.
+
+        Returns
+        -------
+        Relative
+            Functions of the gap, each with k values.
+        """
         gap = positive_gaps(gap)
         distance = sum(self.radii) + gap
         along, stretch = self.along(gap)
@@ -136,12 +171,23 @@ class SpherePair:
         return Relative(n[:, :2], t[:, :2], -n[:, 2] / distance, -t[:, 2] / distance)
 
     def doublet(self, gap: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Return (tension over E_nn (k,) [N s], B (k,)) of the two as one rigid body, free in a
-        flow.
+        """Return the tension and the rotation of both spheres as one rigid body, free in a flow.
 
-        The tension is the force of the water that pulls the two apart along n. The doublet rotates
-        with ω_z + B E_nt, in a shear G with period 4π/(G √(1 − B²)). Both have finite limits at
-        contact: 12.23 πµa² and 0.594 for equal spheres.
+        Parameters
+        ----------
+        gap : (k,) float array
+            Gap of the spheres [m], above 0.
+
+        Returns
+        -------
+        tension : (k,) float array
+            Force of the water that pulls the two apart along n, per strain rate E_nn [N s].
+        elongation : (k,) float array
+            B: the doublet rotates with ω_z + B E_nt, in a shear G with period 4π/(G √(1 − B²)).
+
+        Notes
+        -----
+        Both have finite limits at contact: 12.23 πµa² and 0.594 for equal spheres.
         """
         gap = positive_gaps(gap)
         arm = 0.5 * (sum(self.radii) + gap)
@@ -161,7 +207,18 @@ class SpherePair:
         return tension, turning[:, 1, 0]
 
     def alone(self, gap: ArrayLike) -> "Relative":
-        """Return the relative motion of two spheres without hydrodynamic interaction."""
+        """Return the relative motion of two spheres without hydrodynamic interaction.
+
+        Parameters
+        ----------
+        gap : (k,) float array
+            Gap of the spheres [m], above 0.
+
+        Returns
+        -------
+        Relative
+            Functions of the gap, each with k values.
+        """
         gap = positive_gaps(gap)
         mobility = 1.0 / (6.0 * math.pi * self.viscosity * np.array(self.radii))
         driven = np.tile(mobility * [-1.0, 1.0], (len(gap), 1))

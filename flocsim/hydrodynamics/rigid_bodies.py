@@ -303,6 +303,11 @@ def happel_permeability(grain: float, solid: float) -> float:
     solid : float
         Volume fraction φ of the grains.
 
+    Returns
+    -------
+    float
+        k [m²].
+
     Raises
     ------
     UsageError

@@ -137,7 +137,22 @@ class Tables:
     word = "group"
 
     def labelled(self, group: str) -> Labelled:
-        """Return the arrays of a group with their axes; UsageError for an unknown one."""
+        """Return the arrays of a group with their axes.
+
+        Parameters
+        ----------
+        group : str
+            Name of the group.
+
+        Returns
+        -------
+        Labelled
+
+        Raises
+        ------
+        UsageError
+            If there is no such group.
+        """
         raise NotImplementedError
 
     def __repr__(self) -> str:
@@ -154,14 +169,41 @@ class Tables:
     def to_xarray(self, group: str | None = None) -> Dataset:
         """Return a group as an xarray Dataset, with units, meanings and flags.
 
-        UsageError where xarray is not installed (``pip install 'flocsim[tables]'``).
+        Parameters
+        ----------
+        group : str, optional
+            Name of the group; the first by default.
+
+        Returns
+        -------
+        xarray.Dataset
+
+        Raises
+        ------
+        UsageError
+            If there is no such group, or xarray is not installed (``pip install
+            'flocsim[tables]'``).
         """
         return self.labelled(self.known(group)).to_xarray()
 
     def to_pandas(self, group: str | None = None) -> DataFrame:
-        """Return a group as a pandas DataFrame: a row per place along its axes, codes in words.
+        """Return a group as a pandas DataFrame: one row for each point of its axes, with codes as
+        words.
 
-        UsageError where pandas is not installed (``pip install 'flocsim[tables]'``).
+        Parameters
+        ----------
+        group : str, optional
+            Name of the group; the first by default.
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        UsageError
+            If there is no such group, or pandas is not installed (``pip install
+            'flocsim[tables]'``).
         """
         name = self.known(group)
         return self.labelled(name).to_pandas(self.indices[name])

@@ -138,9 +138,23 @@ THIN = 1e-3
 
 
 def wall(start: Any, end: Any, radius: float | str | None = None) -> Body:
-    """A fixed Body: the segment between two points [m], swept by a disk of a ``radius`` [m].
+    """Return a fixed body: a segment between two points, swept by a disk.
 
-    UsageError where the points are the same.
+    Parameters
+    ----------
+    start, end : (float, float)
+        Ends of the segment [m], or texts such as "5 um".
+    radius : float or str, optional
+        Radius of the disk [m]; a thousandth of the length by default.
+
+    Returns
+    -------
+    Body
+
+    Raises
+    ------
+    UsageError
+        If both points are the same.
     """
     ends = np.array([read_position(start), read_position(end)])
     length = float(np.hypot(*(ends[1] - ends[0])))
@@ -155,8 +169,24 @@ def wall(start: Any, end: Any, radius: float | str | None = None) -> Body:
 def floor(
     width: float | str, y: float | str = 0.0, radius: float | str | None = None, beyond: float = 0.0
 ) -> Body:
-    """A level wall from x = 0 to ``width`` [m] whose upper side is at ``y`` [m]; it goes on for
-    ``beyond`` [m] at both ends, as it must in a box that repeats itself, by the largest body."""
+    """Return a level wall from x = 0 to ``width``.
+
+    Parameters
+    ----------
+    width : float or str
+        Length [m].
+    y : float or str
+        Height of the upper side [m].
+    radius : float or str, optional
+        Half its thickness [m]; a thousandth of ``width`` by default.
+    beyond : float
+        Length [m] by which it extends at both ends; in a periodic box, at least the size of the
+        largest body.
+
+    Returns
+    -------
+    Body
+    """
     wide, top = float(in_unit(width, "m", "width")), float(in_unit(y, "m", "y"))
     thickness = THIN * wide if radius is None else float(in_unit(radius, "m", "radius"))
     level = top - thickness

@@ -38,12 +38,27 @@ from flocsim.system import System, check_bodies, check_forces, read_seed
 
 @attrs.frozen(eq=False, repr=False)
 class SwarmTrajectory:
-    """What became of a swarm of n bodies.
+    """The motion of a swarm of n bodies.
 
-    ``t`` (k,) [s]: the start and the times asked for; ``position`` and ``velocity`` (k, n, 3) as in
-    a Trajectory, places going on through a box that repeats itself; ``error`` (k,) [m], the largest
-    stated error of a body; ``status`` with which the run ended, and ``failed``, the bodies of the
-    island that ended it early; ``effort``, what it took; ``wall_time`` [s]; ``box`` [m].
+    Attributes
+    ----------
+    t : (k,) float array
+        Start, and the requested times [s].
+    position, velocity : (k, n, 3) float array
+        [m, m, rad] and [m/s, m/s, rad/s]; positions continue through a periodic box.
+    error : (k,) float array
+        Largest stated error of position of a body [m].
+    status : Status
+        How the run ended.
+    failed : int array or None
+        Bodies of the island that ended the run early.
+    effort : Effort
+        Numbers of steps.
+    wall_time : float
+        [s]
+    bodies : tuple of Body
+    box : (float, float)
+        Width and height of the periodic box [m]; inf along an axis that is not periodic.
     """
 
     t: np.ndarray
@@ -60,7 +75,7 @@ class SwarmTrajectory:
 
     @functools.cached_property
     def gauge(self) -> Gauge:
-        """What measures gaps between the bodies."""
+        """Object that measures the gaps between the bodies."""
         return self.swarm.gauge()
 
     def __repr__(self) -> str:
@@ -70,18 +85,54 @@ class SwarmTrajectory:
         )
 
     def neighbours(self, at: int = -1, within: float = 0.0) -> Neighbours:
-        """The pairs of bodies nearer to each other than a gap [m], touching ones by default, at a
-        time of ``t``."""
+        """Return the pairs of bodies that touch or are nearer than a gap.
+
+        Parameters
+        ----------
+        at : int
+            Index of the time along ``t``.
+        within : float
+            Gap [m].
+
+        Returns
+        -------
+        Neighbours
+        """
         return self.gauge.neighbours(self.position[at], within)
 
     def clusters(self, at: int = -1, within: float = 0.0) -> Clusters:
-        """The clusters of bodies that touch, or lie nearer than a gap [m], at a time of ``t``."""
+        """Return the clusters of bodies that touch or are nearer than a gap.
+
+        Parameters
+        ----------
+        at : int
+            Index of the time along ``t``.
+        within : float
+            Gap [m].
+
+        Returns
+        -------
+        Clusters
+        """
         near = self.neighbours(at, within)
         return Clusters.of(self.bodies, self.position[at], self.velocity[at], near)
 
     def bonds(self, at: int = -1, within: float = 0.0) -> Bonds:
-        """What holds the pairs that touch, or lie nearer than a gap [m], at a time of ``t``: a
-        certificate, a hook or a rest since the time of ``t`` before, or nothing that is proved."""
+        """Return the kind of bond of every pair that touches or is nearer than a gap.
+
+        Parameters
+        ----------
+        at : int
+            Index of the time along ``t``.
+        within : float
+            Gap [m].
+
+        Returns
+        -------
+        Bonds
+            Certificate, hook, or rest (stable since the previous time of ``t``); or none that is
+            known.
+        """
         at = range(len(self.t))[at]
         motion = np.concatenate([self.position, self.velocity], axis=2)
         before = (float(self.t[at - 1]), motion[at - 1]) if at else None
@@ -89,7 +140,18 @@ class SwarmTrajectory:
         return self.swarm.bond_gauge().bonds(float(self.t[at]), motion[at], near, before)
 
     def momentum(self, at: int = -1) -> np.ndarray:
-        """Σ m v of all bodies that move (2,) [kg m/s], at a time of ``t``."""
+        """Return the momentum Σ m v of all free bodies.
+
+        Parameters
+        ----------
+        at : int
+            Index of the time along ``t``.
+
+        Returns
+        -------
+        (2,) float array
+            [kg m/s]
+        """
         mass = np.array([0.0 if body.fixed else body.mass for body in self.bodies])
         return mass @ self.velocity[at, :, :2]
 
@@ -125,15 +187,29 @@ def read_box(box: Any) -> tuple[float, float]:
 
 @attrs.frozen(eq=False, repr=False)
 class Swarm:
-    """Many bodies in a fluid, moved as islands of those that act on each other.
+    """Many bodies in a fluid, moved as islands of interacting bodies.
 
-    Parameters: as for a System; ``box``, (width, height) [m] of a space that repeats itself along x
-    and y, None for an axis along which it does not; ``seed``, as for a System.
+    Parameters
+    ----------
+    bodies, forces, integrator, fluid
+        As for a System.
+    box : (float or None, float or None), optional
+        Width and height [m] of a periodic box; None for an axis that is not periodic.
+    all_pairs : bool
+        Allow forces without a finite reach for more than 200 bodies.
+    seed : int or sequence of int
+        As for a System.
 
-    Each island has its own steps, its own lists and its own switches, from one common time to the
-    next, and pair forces end at their reach. UsageError for forces without a reach among more than
-    200 bodies, unless ``all_pairs``, for a box that is too small, or with a flow that varies along
-    an axis along which it is periodic.
+    Raises
+    ------
+    UsageError
+        If a force has no finite reach among more than 200 bodies, if the box is too small for the
+        bodies and forces, or if the flow varies along a periodic axis.
+
+    Notes
+    -----
+    Each island has its own time steps and contact lists between two common times; pair forces end
+    at their reach.
     """
 
     bodies: tuple[Body, ...] = attrs.field(converter=check_bodies)
@@ -177,20 +253,21 @@ class Swarm:
 
     @property
     def reach(self) -> float:
-        """The gap at which the last of the pair forces ends [m]."""
+        """Largest gap at which a pair force acts [m]."""
         return max(0.0, self.system.pieces.surface_reach, self.system.pieces.centre_reach)
 
     def gauge(self) -> Gauge:
-        """What measures the gaps of its bodies, wherever they are."""
+        """Return an object that measures the gaps of the bodies at any positions."""
         return Gauge(self.system.scene()._replace(box=self.box), self.fillings())
 
     def bond_gauge(self) -> BondGauge:
-        """What tells the kinds of bonds of its bodies, wherever they are."""
+        """Return an object that finds the kinds of bonds at any positions."""
         return BondGauge(self)
 
     def check_box(self) -> None:
-        """UsageError for a box in which bodies would meet themselves, or a flow that does not
-        repeat itself."""
+        """Raise UsageError if the box is too small for the bodies and forces, or the flow is not
+        periodic.
+        """
         if min(self.box) == math.inf:
             return
         check_box([body.shape for body in self.bodies if not body.fixed], self.box, self.reach)
@@ -200,8 +277,10 @@ class Swarm:
                 raise UsageError(FLOW_ADVICE.format(axis=axis))
 
     def check_overlaps(self, gauge: Gauge) -> None:
-        """UsageError where two bodies start with crossing cores or too deep an overlap; fixed ones
-        may, and are no neighbours."""
+        """Raise UsageError if two bodies start with crossing cores or too deep an overlap.
+
+        Two fixed bodies may overlap.
+        """
         position, _ = self.system.motion()
         near = gauge.neighbours(position)
         for (i, j), vector in zip(near.pairs.tolist(), near.vector, strict=True):
@@ -216,8 +295,10 @@ class Swarm:
         self, until: float, *, threads: int = 1, max_steps: int = MOST_STEPS,
         leaving: Leaving | None = None,
     ) -> Progress:  # fmt: skip
-        """A Progress to a time [s] that has yet to begin; ``leaving``: what becomes of bodies that
-        leave the box."""
+        """Return a Progress to a time [s] that has not taken a step yet.
+
+        ``leaving``: rule for bodies that leave the box.
+        """
         scene = self.system.scene()._replace(box=self.box)
         fillings = {**self.system.compiled_calls, **self.fillings()}
         what = f"the engine for swarms of {self.system.family}"
@@ -233,8 +314,10 @@ class Swarm:
         return Progress(runner, swarm, self.box, self.reach, until, leaving, shielding)
 
     def fillings(self) -> dict[Callable, Callable]:
-        """{hook: function} of integrator, shapes and the watch over paths; the same with a box and
-        without, so that one engine serves both."""
+        """Return {hook: function} of integrator, shapes and path recording.
+
+        They are the same with and without a box, so that one compiled engine serves both.
+        """
         return {**self.system.fillings({observe: watch_paths}, grows=True), **PERIODIC}
 
     def run(
@@ -242,14 +325,34 @@ class Swarm:
         times: Sequence[float] | None = None, threads: int = 1, max_steps: int = MOST_STEPS,
         watch: Callable[[float], bool] | None = None,
     ) -> SwarmTrajectory:  # fmt: skip
-        """Move the bodies until a time, in s or as "10 s", and return the SwarmTrajectory.
+        """Move the bodies until a time.
 
-        Its times: ``times`` [s], or one ``every`` so long; without either, start and end.
-        ``threads`` may run at once, which changes no number. ``max_steps`` may be tried from one
-        common time to the next by an island of up to 50 bodies, by one of n 50/n times as many: a
-        run that needs more ends as STEP_BUDGET, with the island's bodies in ``failed``.
-        ``watch(time)`` is called at every common time, and ends the run where it returns what
-        counts as true. A run that ends early says why in ``status``.
+        Parameters
+        ----------
+        until : float or str
+            End time [s], or a text such as "10 s".
+        every : float or str, optional
+            Interval between the stored times [s].
+        times : sequence of float, optional
+            Stored times [s], instead of ``every``. Without either, start and end are stored.
+        threads : int
+            Number of threads; results do not depend on it.
+        max_steps : int
+            Largest number of steps of an island of up to 50 bodies between two common times; for n
+            > 50 bodies it is 50/n of this number.
+        watch : callable, optional
+            Function of the time [s], called at every common time; the run stops if it returns true.
+
+        Returns
+        -------
+        SwarmTrajectory
+            Its ``status`` says why a run ended early: with STEP_BUDGET, ``failed`` has the bodies
+            of the island that needed more steps.
+
+        Raises
+        ------
+        UsageError
+            If an argument is wrong, or two bodies start with too deep an overlap.
         """
         end = above_zero(until, "s", "until")
         check_whole(max_steps, 0, "max_steps")

@@ -27,8 +27,17 @@ FRAMES, ANIMATION_FRAMES = 6, 60
 
 @attrs.frozen(eq=False)
 class State:
-    """The bodies at one time, or at k of them: ``t`` [s], a number or (k,); ``position`` (n, 3)
-    [m, m, rad] and ``velocity`` (n, 3) [m/s, m/s, rad/s], or (k, n, 3)."""
+    """Positions and velocities of n bodies at one time, or at k times.
+
+    Attributes
+    ----------
+    t : float or (k,) float array
+        Time [s].
+    position : (n, 3) or (k, n, 3) float array
+        x, y and angle [m, m, rad].
+    velocity : (n, 3) or (k, n, 3) float array
+        Velocity and spin [m/s, m/s, rad/s].
+    """
 
     t: Any
     position: np.ndarray
@@ -45,16 +54,28 @@ Watch = Callable[[State], Any]
 
 @attrs.frozen(eq=False, repr=False)
 class Trajectory:
-    """What happened in a run of n bodies.
+    """The motion of n bodies in a run, and what can be computed from it.
 
-    ``t`` (k,) [s]; ``position`` (k, n, 3) [m, m, rad] and ``velocity`` (k, n, 3) [m/s, m/s, rad/s]
-    at the start and after every accepted step; ``status``, a Status whose ``reason`` says in words
-    how the run ended; ``steps`` taken, ``rejected`` and force ``evaluations``; ``error`` [m], what
-    the errors of steps and of switches have led to by the end (nan where the method estimates
-    none); ``wall_time`` [s]; ``amplification``, by how much the motion amplifies a perturbation
-    (None where that was not asked for): above MOST_AMPLIFIED, 10, the error is no guarantee, and
-    ``error_text`` says so; ``row``, of a replicate of a study, what its table of replicates holds
-    of it, in words (None of other runs).
+    Attributes
+    ----------
+    t : (k,) float array
+        Times of the start and of every accepted step [s].
+    position, velocity : (k, n, 3) float array
+        [m, m, rad] and [m/s, m/s, rad/s] at these times.
+    status : Status
+        How the run ended; its ``reason`` says so in words.
+    steps, rejected, evaluations : int
+        Numbers of accepted and of rejected steps, and of force evaluations.
+    error : float
+        Stated error of position at the end [m], propagated from all steps; NaN if the method
+        does not estimate it.
+    wall_time : float
+        [s]
+    amplification : float or None
+        Factor by which the motion amplifies a perturbation; None if it was not asked for. Above
+        10 the error is not guaranteed, and ``error_text`` says so.
+    row : dict or None
+        Of a replicate of a study: its row of the table of replicates, in words.
     """
 
     t: np.ndarray
@@ -80,7 +101,7 @@ class Trajectory:
 
     @property
     def error_text(self) -> str:
-        """What can be said of the error at the end, in words."""
+        """Description of the stated error at the end."""
         if not np.isfinite(self.error):
             return "the method does not estimate its error"
         stated = f"stated error {self.error:.2g} m"
@@ -98,13 +119,13 @@ class Trajectory:
         cls, run: Run, status: Status, wall_time: float, amplification: float | None = None,
         row: dict | None = None, origin: Origin | None = None,
     ) -> "Trajectory":  # fmt: skip
-        """What a Run has come to."""
+        """Return the Trajectory of a Run."""
         counts = run.steps, run.rejected, run.evaluations
         error = run.error if np.isfinite(run.clock.tolerance) else float("nan")
         return cls(*run.motion(), status, *counts, error, wall_time, amplification, row, origin)
 
     def known(self) -> Origin:
-        """Where this came from; UsageError for one that was read from a file."""
+        """Return the Origin of the run; raise UsageError for one read from a file."""
         if self.origin is None:
             raise UsageError(
                 "this Trajectory has only its motion: run it again with System.run for more"
@@ -113,7 +134,7 @@ class Trajectory:
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
-        """The bodies' shapes."""
+        """Shapes of the bodies."""
         return self.stored_shapes or tuple(body.shape for body in self.known().bodies)
 
     @functools.cached_property
@@ -131,7 +152,7 @@ class Trajectory:
         return found[:, 0], states[:, :, :3], states[:, :, 3:]
 
     def checked_times(self, times: Any) -> np.ndarray:
-        """Times as an array (k,); UsageError for what is no time of the run."""
+        """Return times as an array (k,) [s]; raise UsageError unless the run covers all of them."""
         if isinstance(times, str):
             times = in_unit(times, "s", "t")
         try:
@@ -147,13 +168,29 @@ class Trajectory:
         return found
 
     def at(self, t: Any) -> State:
-        """The State at a time, in s or as "5 ms", or at an array of times [s].
+        """Return the State at a time, or at several.
 
-        At a step, what was computed. Between two, the interpolation that the method itself goes by:
-        of Implicit and Overdamped the series of the step, or the cubic through its stages, whose
-        error is below a quarter of what the method estimates for the step where that is smooth; of
-        all others Hermite's cubic through places and velocities at both ends, whose error goes with
-        h⁴ in places.
+        Parameters
+        ----------
+        t : float, str or (k,) float array
+            Time [s], a text such as "5 ms", or an array of times [s].
+
+        Returns
+        -------
+        State
+            With arrays (n, 3) for a single time, else (k, n, 3).
+
+        Raises
+        ------
+        UsageError
+            If the run does not cover a time.
+
+        Notes
+        -----
+        At a step the state is the computed one. Between two steps it follows from the interpolation
+        of the method: for Implicit and Overdamped the power series of the step, or the cubic
+        through its stages, whose error is below a quarter of the estimate for that step where the
+        motion is smooth; for all others Hermite's cubic, whose error is of order h⁴ in positions.
         """
         wanted = self.checked_times(t)
         times, position, velocity = self.all_steps
@@ -174,9 +211,27 @@ class Trajectory:
         return State(wanted, found[:, :, :3], found[:, :, 3:])
 
     def contacts(self, t: float) -> list[Contact]:
-        """All contact points at a time [s]: where, how deep, ξ, and the forces there.
+        """Return all contact points at a time.
 
-        At a step, just as the run has them. Between two, of `at`'s state and of ξ taken linearly.
+        Parameters
+        ----------
+        t : float or str
+            Time [s], or a text such as "5 ms".
+
+        Returns
+        -------
+        list of Contact
+            Position, overlap, elastic tangential displacement ξ, and force of each contact point.
+
+        Raises
+        ------
+        UsageError
+            If the run does not cover the time, or was read from a file.
+
+        Notes
+        -----
+        At a step they are those of the run. Between two steps they follow from the state of `at`,
+        with ξ interpolated linearly.
         """
         wanted = self.checked_times(t)
         if len(wanted) != 1:
@@ -184,12 +239,28 @@ class Trajectory:
         return next(Replay(self.known()).instants(wanted, self.all_steps[0])).contacts()
 
     def forces(self, t: Any = None) -> dict[str, np.ndarray]:
-        """{force: (k, n, 3)} force and torque of each one on every body [N, N, N m].
+        """Return the force and torque of each force on every body.
 
-        At times (k,) [s], by default ``t``; (n, 3) at a single one. Forces are named by their
-        classes, further ones of a class as "Pull (2)". At steps they are those that the run was
-        driven by; between two, those of `at`'s state, which of stiff contacts are no better than
-        that.
+        Parameters
+        ----------
+        t : float, str or (k,) float array, optional
+            Times [s]; all of ``t`` by default.
+
+        Returns
+        -------
+        dict of str to (k, n, 3) float array
+            Force and torque [N, N, N m] by name; (n, 3) for a single time. Forces have the names of
+            their classes; a second one of a class is "Pull (2)".
+
+        Raises
+        ------
+        UsageError
+            If the run does not cover a time, or was read from a file.
+
+        Notes
+        -----
+        At a step they are those that moved the bodies. Between two steps they follow from the state
+        of `at`, whose error stiff contacts amplify.
         """
         wanted = self.checked_times(self.t if t is None else t)
         replay, order = Replay(self.known()), np.argsort(wanted, kind="stable")
@@ -203,18 +274,44 @@ class Trajectory:
         return {name: values[0] for name, values in found.items()} if single else found
 
     def energies(self) -> Energies:
-        """Kinetic energies, and the work of each kind of force, at every step."""
+        """Return kinetic energies, and the work of each kind of force, at every step.
+
+        Returns
+        -------
+        Energies
+            Arrays (k,) [J].
+
+        Raises
+        ------
+        UsageError
+            If the run was read from a file.
+        """
         times, _, velocity = self.all_steps
         return energies_of(self.known(), times, velocity)
 
     def go_on(
         self, until: float | str, *, max_steps: int = 1_000_000, watch: Watch | None = None
     ) -> "Trajectory":
-        """The Trajectory of the same run gone on with until a later time, from its start.
+        """Continue the same run, and return the Trajectory from its start.
 
-        ``until`` is in s, or a text such as "20 ms". Contacts keep their history (ξ), the method
-        its step. ``max_steps`` counts from here on; ``watch`` as in System.run. UsageError where
-        the run cannot get any further.
+        Parameters
+        ----------
+        until : float or str
+            New end time [s], or a text such as "20 ms".
+        max_steps : int
+            Largest number of further steps.
+        watch : callable, optional
+            Function of a State that stops the run, as in `System.run`.
+
+        Returns
+        -------
+        Trajectory
+            The whole run. Contacts continue with their history ξ, the method with its step.
+
+        Raises
+        ------
+        UsageError
+            If the run cannot continue, was read from a file, or has already passed ``until``.
         """
         origin = self.known()
         end: float = in_unit(until, "s", "until")
@@ -235,13 +332,31 @@ class Trajectory:
         self, figure: str = "strip", file: str | os.PathLike | None = None, frames: int = FRAMES,
         *, overwrite: bool = False,
     ) -> Any:  # fmt: skip
-        """Return a matplotlib Figure: "strip" of frames, "energies" (work of each force, kinetic),
-        and of a pair "distance" of the centres or "forces".
+        """Draw a figure.
 
-        Forces are those on the second body along the line of centres, above 0 where they push
-        apart. Written to ``file`` if given; with ``overwrite`` a file that exists is kept under
-        another name. UsageError for an unknown figure, and where there are not two bodies but for
-        the strip and the energies; FileError for a file in the way.
+        Parameters
+        ----------
+        figure : str
+            "strip" of frames, "energies" (work of each force, and kinetic energy), or, for a pair,
+            "distance" of the centres or "forces": those on the second body along the line of
+            centres, positive in repulsion.
+        file : path, optional
+            Where to write the figure.
+        frames : int
+            Number of frames of the strip.
+        overwrite : bool
+            Whether to rename an existing file instead of raising FileError.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        UsageError
+            If the figure is unknown, or needs two bodies.
+        FileError
+            If the file exists or cannot be written.
         """
         from flocsim.io.plots.style import save
         from flocsim.trajectories.figures import drawn
@@ -254,16 +369,42 @@ class Trajectory:
     def animate(
         self, file: str | os.PathLike, frames: int = ANIMATION_FRAMES, *, overwrite: bool = False
     ) -> None:
-        """Write an animation of a pair as a GIF; UsageError where there are not two bodies."""
+        """Write an animation of a pair as a GIF.
+
+        Parameters
+        ----------
+        file : path
+            Name of the GIF.
+        frames : int
+            Number of frames.
+        overwrite : bool
+            Whether to rename an existing file instead of raising FileError.
+
+        Raises
+        ------
+        UsageError
+            If there are not two bodies.
+        FileError
+            If the file exists or cannot be written.
+        """
         from flocsim.trajectories.figures import animated
 
         animated(self, Path(file), frames, rule=overwrite)
 
     def save(self, file: str | os.PathLike, *, overwrite: bool = False) -> None:
-        """Write the motion to HDF5, which `flocsim info`, `flocsim plot` and xarray read.
+        """Write the motion to HDF5, which `flocsim info`, `flocsim plot` and xarray can read.
 
-        A file that is there is left alone, unless ``overwrite``, which keeps it under another name.
-        FileError where it cannot be written.
+        Parameters
+        ----------
+        file : path
+            Name of the file.
+        overwrite : bool
+            Whether to rename an existing file instead of raising FileError.
+
+        Raises
+        ------
+        FileError
+            If the file exists or cannot be written.
         """
         from flocsim.io.outputs import check_outputs
         from flocsim.io.trajectory import write_trajectory
@@ -280,10 +421,23 @@ class Trajectory:
 
     @classmethod
     def load(cls, file: str | os.PathLike) -> "Trajectory":
-        """Read what `save`, or `flocsim trajectory --save`, has written.
+        """Read a file of `save`, or of `flocsim trajectory --save`.
 
-        Motion and shapes, to be asked with `at`, drawn and exported; forces, contacts and more
-        motion need the System. FileError for a file that is absent, damaged or of another kind.
+        Parameters
+        ----------
+        file : path
+            Name of the file.
+
+        Returns
+        -------
+        Trajectory
+            Motion and shapes, for `at`, `plot` and `export`. Forces, contacts and `go_on` need the
+            System and are not available.
+
+        Raises
+        ------
+        FileError
+            If the file is absent, damaged or of another kind.
         """
         from flocsim.io.trajectory import read_trajectory
 
@@ -298,12 +452,26 @@ class Trajectory:
         return cls(*motion, status, *counts, error, np.nan, stored_shapes=found.shapes)
 
     def export(self, file: str | os.PathLike, *, overwrite: bool = False) -> None:
-        """Write the motion for OVITO and HOOMD, where ``file`` ends in .gsd, or for ParaView, in
-        .vtkhdf.
+        """Write the motion for OVITO and HOOMD (.gsd), or for ParaView (.vtkhdf).
 
-        In GSD lengths are in µm, times in s, and shapes are polygons without their holes. A file
-        that is there is left alone, unless ``overwrite``. UsageError for another ending, and where
-        gsd is not installed (``pip install 'flocsim[formats]'``).
+        Parameters
+        ----------
+        file : path
+            Name of the file; its ending determines the format.
+        overwrite : bool
+            Whether to rename an existing file instead of raising FileError.
+
+        Raises
+        ------
+        UsageError
+            If the ending is another one, or gsd is not installed (``pip install
+            'flocsim[formats]'``).
+        FileError
+            If the file exists or cannot be written.
+
+        Notes
+        -----
+        In GSD lengths are in µm, times in s, and shapes are polygons without holes.
         """
         from flocsim.io.outputs import check_outputs
         from flocsim.io.trajectory import WRITERS

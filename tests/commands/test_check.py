@@ -77,7 +77,7 @@ def test_a_method_without_a_tolerance_may_be_off_by_a_share_of_the_smaller_radiu
 
 
 def test_an_outcome_that_is_not_the_references_fails():
-    assert verdict(0.0, two=end("B")) == (check.WRONG, "A, inside, and the reference B, inside")
+    assert verdict(0.0, two=end("B")) == (check.WRONG, "A, inside, but B, inside in the reference")
 
 
 @pytest.mark.parametrize(

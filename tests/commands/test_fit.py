@@ -155,7 +155,7 @@ def test_the_library_is_drawn_and_described(tmp_path, frame, capsys):
         assert args.run(args) == 0
     printed = capsys.readouterr().out
     assert "s-figure-2.png" in printed and "s-figure-3.png" in printed
-    assert "3 of 1 pictures" in printed and "method         pattern" in printed
+    assert "3 of 1 picture" in printed and "method         pattern" in printed
     for number in (2, 3):
         assert (tmp_path / f"s-figure-{number}.png").stat().st_size > 5000
 

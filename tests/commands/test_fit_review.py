@@ -70,7 +70,9 @@ def test_the_page_has_every_region_and_loads_nothing(page):
 def test_the_command_says_how_to_go_on(folder, capsys):
     assert fit(folder, "--review") == 0
     last = capsys.readouterr().out.splitlines()[-1]
-    assert last.startswith(f"{folder / 'c-review.html'}: choose flocs on it, save the choices")
+    assert last.startswith(
+        f"{folder / 'c-review.html'}: choose flocs on this page, save the choices"
+    )
     assert "--reviewed reviewed.json --overwrite" in last
 
 
@@ -78,7 +80,7 @@ def test_flocs_are_rejected_and_added(folder, page, capsys):
     everything = read_library(folder / "s.h5")
     choices = choose(page, {"a.png#1": "reject", "b.png#3": "keep"})
     assert fit(folder, "--reviewed", choices) == 0
-    assert "a.png: 1 dark floc, rejected 1 by eye and 1 too small" in capsys.readouterr().out
+    assert "a.png: 1 dark floc; rejected: 1 by eye, 1 too small" in capsys.readouterr().out
     assert names_in(folder) == ["a.png#2", "b.png#1", "b.png#2", "b.png#3"]
     kept = {entry.floc_id: entry.area for entry in read_library(folder / "c.h5")}
     assert kept.items() >= {each.floc_id: each.area for each in everything[1:]}.items()

@@ -36,7 +36,7 @@ def test_a_row_for_every_type_and_setting(implicit_alone, capsys):
     for loose, tight in zip(rows[::2], rows[1::2], strict=True):
         assert (loose["setting"], tight["setting"]) == ("1e-06", "1e-07")
         assert 0.0 < float(tight["most"]) < 1e-4 and 0.0 < float(loose["most"]) < 1e-4
-    assert "the sampling error of the study is 37 %" in text
+    assert "the sampling error of the study, 37 %" in text
 
 
 def test_the_figure_is_written_once(implicit_alone, capsys):

@@ -91,7 +91,7 @@ def test_refusals():
     drag, bodies = StokesDrag(permeability=1e-12), [
         Body(Sphere(R), (3.0 * R * each, 0.0), density=1100.0) for each in range(2)
     ]  # fmt: skip
-    with pytest.raises(UsageError, match="without permeability"):
+    with pytest.raises(UsageError, match="no permeability"):
         System(bodies, [Gravity(), drag, PairResistance()], fluid=WATER)
     with pytest.raises(UsageError, match="would get too hot"):
         System(bodies, [drag, Thermal(kick="1 ms")], fluid=WATER).run(1e-3)

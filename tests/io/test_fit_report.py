@@ -20,11 +20,11 @@ def entry(name, errors, spheroradius=1.0):
         # Above 5 % at the largest N alone counts.
         (
             {"a": {8: 20.0, 16: 10.0}},
-            "N = 16 is too small for 1 of 1 floc: RE is above 5 %, and 10 %",
+            "N = 16 is too small for 1 of 1 floc: RE is above 5 %, for a even 10 %",
         ),
         (
             {"a": {16: 10.0}, "b": {16: 20.0}, "c": {16: 1.0}},
-            "2 of 3 flocs: RE is above 5 %, and 20 %",
+            "2 of 3 flocs: RE is above 5 %, for b even 20 %",
         ),
     ],
 )

@@ -306,8 +306,27 @@ class Reading:
 def load_config(
     path: str | os.PathLike, overrides: dict | None = None, sources: Sources | None = None
 ) -> Config:
-    """Return the config of a study of binary collisions: see `load_any_config`; ConfigError for one
-    of another kind."""
+    """Read the config of a study of pairs or kernels.
+
+    Parameters
+    ----------
+    path : path
+        TOML file.
+    overrides : dict, optional
+        Nested dict of values that replace those of the file; None counts as not given.
+    sources : Sources, optional
+        Texts of the file and of modules that have already been read.
+
+    Returns
+    -------
+    Config
+        Checked, with the values of its preset filled in; SI units.
+
+    Raises
+    ------
+    ConfigError
+        If a value is wrong, with one line per problem; also for a study of another kind.
+    """
     config = load_any_config(path, overrides, sources)
     if not isinstance(config.scene, PairScene):
         text = f'{path} has scene.kind = "{config.scene.kind}", and is not one of two bodies: '

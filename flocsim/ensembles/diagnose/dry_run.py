@@ -1,4 +1,4 @@
-"""`--dry-run`: what a study would run, how long it takes and what is doubtful, without running it.
+"""`--dry-run`: describe a study, its duration and its warnings, without running it.
 
 With ``--verbose`` also its collisions, forces and time scales.
 """

@@ -29,10 +29,16 @@ from flocsim.io.results.schema import AXES, COMPARED, COORDINATES, PER_APPROACH
 
 @attrs.frozen(eq=False, repr=False)
 class Comparison(Differences):
-    """What one results file of pairs has more of than another: `flocsim.compare` makes it.
+    """Differences between two results of pairs, as `flocsim.compare` returns them.
 
-    ``arrays`` {probability: {name: (type, vertices, delta)}}; where they are ``paired`` intervals
-    are Newcombe's.
+    Attributes
+    ----------
+    arrays : dict of str to dict of str to (type, vertices, delta) array
+        {probability: {name: values}}.
+
+    Notes
+    -----
+    Intervals of paired replicates are those of Newcombe. For the other attributes see Differences.
     """
 
     quantities: ClassVar[Mapping[str, tuple[str, str]]] = {"pr_a": ("1", COMPARED["pr_a"])} | {

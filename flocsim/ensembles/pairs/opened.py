@@ -118,12 +118,22 @@ INDICES = {name: group.index for name, group in GROUPS.items()}
 
 
 class StudyResults(Tables):
-    """A results file as `flocsim.open` gives it; docs/results.md says what is in it.
+    """Results of a study of pairs or kernels, as `flocsim.open` returns them (docs/results.md).
 
-    ``types``, ``vertices`` and ``delta`` are its conditions, each with ``count`` replicates;
-    ``probabilities``, ``pooled``, ``differences``, ``numerics`` and ``outlines`` {name: array}
-    its tables, ``replicates`` the same of every single collision, read when asked for; ``kernel``
-    the rates of a kernel study, None in others; ``run`` where it came from.
+    Attributes
+    ----------
+    types, vertices, delta : arrays
+        Axes of the conditions; each condition has ``count`` replicates.
+    probabilities, pooled, differences, numerics, outlines : dict of str to array
+        Tables along these axes.
+    replicates : dict of str to (type, vertices, delta, replicate) array
+        Every single encounter, read when first used.
+    kernel : Kernel or None
+        Widths and kernels of a kernel study.
+    config : Config
+        Config that the study was run with.
+    run : dict
+        Metadata of the run.
     """
 
     indices = INDICES
@@ -146,19 +156,21 @@ class StudyResults(Tables):
 
     @functools.cached_property
     def replicates(self) -> dict[str, np.ndarray]:
-        """{column: (type, vertices, delta, replicate)} of all replicates, read from the file that
-        was opened; FileError where another has been copied over it."""
+        """{column: (type, vertices, delta, replicate)} of all replicates, read from the file.
+
+        Raises FileError if another file has replaced it.
+        """
         assert self.results.replicates is not None
         return dict(self.results.replicates)
 
     def load_all(self) -> None:
-        """Read all rows now, so that the file may go."""
+        """Read all rows now, so that the file can be deleted."""
         self.results = attrs.evolve(self.results, replicates=self.replicates)
         self.path = Path("results in memory")
 
     @functools.cached_property
     def config(self) -> Config:
-        """What was run: the config that the file holds, and what was laid over it."""
+        """Config that the study was run with, including command-line values."""
         text = str(self.run.get("config", ""))
         if not text:
             raise FileError(f"{self.path} has no config: it was not written by flocsim ensemble")
@@ -173,15 +185,36 @@ class StudyResults(Tables):
             ) from error
 
     def stored(self, name: str) -> dict:
-        """What the group ``run`` has as JSON."""
+        """Return an entry of the group ``run`` that is stored as JSON."""
         return stored_in(self, name)
 
     def table(self) -> str:
-        """Counts and probabilities of every condition as the command prints them, as text."""
+        """Return the table that `flocsim info` prints: counts and probabilities of every condition.
+
+        Returns
+        -------
+        str
+        """
         return CONTENTS.table(self.results)
 
     def labelled(self, group: str = "probabilities") -> Labelled:
-        """The arrays of a group of the file with their axes; UsageError for an unknown one."""
+        """Return the arrays of a group with their axes.
+
+        Parameters
+        ----------
+        group : str
+            "probabilities", "pooled", "replicates", "kernel", or another group of the file.
+
+        Returns
+        -------
+        Labelled
+            Axes and columns with units and meanings; see also `to_xarray` and `to_pandas`.
+
+        Raises
+        ------
+        UsageError
+            If the file has no such group.
+        """
         group = self.known(group)
         if self.kernel is not None and group == "kernel":
             found = self.kernel.labelled()
@@ -196,10 +229,27 @@ class StudyResults(Tables):
         self, figure: str = "overview", file: str | os.PathLike | None = None, *,
         overwrite: bool = False,
     ) -> Figure:  # fmt: skip
-        """Return one of the figures of `flocsim plot`, as a matplotlib Figure.
+        """Draw one of the figures of `flocsim plot`.
 
-        Written to ``file`` if given; with ``overwrite`` a file that exists is kept under another
-        name. UsageError for an unknown figure, which lists them, FileError for a file in the way.
+        Parameters
+        ----------
+        figure : str
+            Name of the figure.
+        file : path, optional
+            Where to write it.
+        overwrite : bool
+            Whether to rename an existing file instead of raising FileError.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        UsageError
+            If the figure is unknown; the message lists those that exist.
+        FileError
+            If the file exists or cannot be written.
         """
         if figure not in FIGURES:
             raise UsageError(f"figure must be one of {', '.join(FIGURES)}, found {figure!r}")
@@ -213,13 +263,31 @@ class StudyResults(Tables):
         self, replicate: int = 0, type: str | None = None, vertices: int | None = None,
         delta: float | None = None,
     ) -> Trajectory:  # fmt: skip
-        """Run one replicate of the file again, and keep its motion.
+        """Run one replicate of the file again, and return its motion.
 
-        Of a collision type (default: the first), with so many vertices (the last) at a displacement
-        (the first). UsageError where the file does not have it, where the config's library is not
-        where the results lie (``flocsim.open(path, folder=…)`` says where), and where this flocsim
-        computes something else than the file holds. ConfigError for a class of one's own whose
-        module was not allowed (``folder`` or ``own`` of `flocsim.open`).
+        Parameters
+        ----------
+        replicate : int
+            Index of the replicate, from 0.
+        type : str, optional
+            Collision type; the first by default.
+        vertices : int, optional
+            N; the last by default.
+        delta : float, optional
+            Displacement δ/δ_max; the first by default.
+
+        Returns
+        -------
+        Trajectory
+            Its ``row`` has the row of the table of replicates, in words.
+
+        Raises
+        ------
+        UsageError
+            If the file has no such replicate, if the shape library is not beside the results (see
+            ``folder`` of `flocsim.open`), or if this version of flocsim computes other results.
+        ConfigError
+            If the study has your own class and its module is not allowed (see `flocsim.open`).
         """
         if not is_whole(replicate) or not 0 <= replicate < self.count:
             raise UsageError(
@@ -238,18 +306,30 @@ class StudyResults(Tables):
         return found
 
     def in_water(self) -> list[dict[str, Any]]:
-        """[{type, water, alone}]: the share of the rectilinear kernel of the equivalent spheres of
-        each type that touches with the water that they push at each other, and without.
+        """Return collision efficiencies of equivalent spheres, with and without hydrodynamics.
 
-        Computed by their ways in three dimensions, without inertia (flocsim.hydrodynamics), in a
-        second for each type. UsageError where that is not known.
+        Returns
+        -------
+        list of dict
+            Of each collision type "type", "water" and "alone": fraction of the rectilinear kernel
+            that touches with hydrodynamic interaction, and without.
+
+        Raises
+        ------
+        UsageError
+            If the efficiency is not known for such a study.
+
+        Notes
+        -----
+        Trajectories of spheres in three dimensions without inertia
+        (`flocsim.hydrodynamics.Meeting`); takes about a second for each type.
         """
         return water_facts(self.config)
 
     def study_with(self, vertices: int) -> Study:
-        """The study of the file with bodies of so many vertices, ready to run replicates again.
+        """Return the study of the file with one number of vertices, to run replicates again.
 
-        UsageError where this flocsim would compute something else than the file holds.
+        Raises UsageError if this version of flocsim would compute other results.
         """
         if vertices not in self.studies:
             config, identity = self.config, self.stored("identity")
@@ -260,7 +340,7 @@ class StudyResults(Tables):
         return self.studies[vertices]
 
     def refuse(self, unlike: str) -> None:
-        """Raise UsageError for what differs from what the file says."""
+        """Raise UsageError for a difference between the file and this machine."""
         raise UsageError(
             f"{self.path} cannot be reproduced: {unlike}; use the version of flocsim, the files "
             "and the kind of machine that it was made with"

@@ -181,8 +181,17 @@ def swept_table(table: Labelled) -> tuple[Sequence[str], Row]:
 
 @attrs.frozen(eq=False, repr=False)
 class SwarmComparison(Differences):
-    """What one file of swarms has more of than another: ``arrays`` {column of the counts: {name:
-    (time,)}}; intervals by Student's t."""
+    """Differences between two results of swarms, as `flocsim.compare` returns them.
+
+    Attributes
+    ----------
+    arrays : dict of str to dict of str to (time,) array
+        {column of counts: {name: values}}.
+
+    Notes
+    -----
+    Intervals are those of Student's t. For the other attributes see Differences.
+    """
 
     noun = "swarms"
     quantities: ClassVar[Mapping[str, tuple[str, str]]] = {

@@ -233,7 +233,18 @@ class Shape:
 
 @attrs.frozen(eq=False)
 class Sphere(Shape):
-    """A disk of ``radius`` [m] in the plane of motion: one core point at its centre."""
+    """A disk in the plane of motion: one core point at its centre.
+
+    Parameters
+    ----------
+    radius : float
+        [m]
+
+    Raises
+    ------
+    ShapeError
+        If the radius is not finite and above 0.
+    """
 
     radius: float = attrs.field(converter=positive_radius)
 

@@ -189,20 +189,42 @@ CORRECTIONS: dict[str, dict[str, Factor]] = {
 
 
 def curvilinear_factor(name: str, mechanism: str, r_i: ArrayLike, r_j: ArrayLike) -> np.ndarray:
-    """Return what the rectilinear kernel of two spheres is multiplied by for the water between.
+    """Return the factor by which water between two spheres reduces their rectilinear kernel.
 
-    ``name``: "hill" or "burd"; ``mechanism``: "settling" or "shear"; ``r_i``, ``r_j``: radii [m],
-    numbers or arrays that broadcast. With p = r_small/r_large the factor, from 0 to 1, is
+    Parameters
+    ----------
+    name : "hill" or "burd"
+        Source of the formula.
+    mechanism : "settling" or "shear"
+        What brings the spheres together.
+    r_i, r_j : float or float arrays
+        Radii [m]; arrays broadcast.
+
+    Returns
+    -------
+    float array
+        Factor from 0 to 1, symmetric in i and j.
+
+    Raises
+    ------
+    UsageError
+        If the name is unknown, the mechanism has no formula, or a radius is not above 0.
+
+    Notes
+    -----
+    With p = r_small/r_large:
 
     - settling: ½ (p/(1 + p))²;
-    - shear: 9.8/1.3 (p/(1 + 2p))² (hill), 1 − (1 + 5p + 2.5p²)/(1 + p)⁵ (burd);
+    - shear: 9.8/1.3 (p/(1 + 2p))² (hill), 1 − (1 + 5p + 2.5p²)/(1 + p)⁵ (burd).
 
-    symmetric in i and j; it rises with p. Sources: SLAMS-OIL and CSIRO EMS (hill), BurdLab's
-    MatlabCoagThorium (burd); this file's head has paths and commits. No forces, no inertia, no
-    porosity: of flocs, through which water passes, it is not known. It is no efficiency: kernel ×
-    factor × alpha is common practice, and approximate. UsageError for other names, mechanisms
-    without a formula, and radii that are not above 0.
+    The formulas neglect forces, inertia and porosity; for permeable flocs the factor is not known.
+    It is not an efficiency: kernel × factor × alpha is common practice, but approximate.
 
+    Sources: SLAMS-OIL and CSIRO EMS (hill), BurdLab's MatlabCoagThorium (burd); the head of this
+    file has paths and commits.
+
+    Examples
+    --------
     >>> float(curvilinear_factor("hill", "settling", 5e-6, 5e-6))
     0.125
     """

@@ -160,8 +160,17 @@ GROUPS = {
 
 
 class SwarmResults(Stored):
-    """What a swarm study has found: ``scales`` {axis: values}, ``groups`` {group: {column: array}}
-    as in GROUPS, ``run`` scalars."""
+    """Results of a swarm study, as `flocsim.open` returns them.
+
+    Attributes
+    ----------
+    scales : dict of str to array
+        Axes and their values.
+    groups : dict of str to dict of str to array
+        Columns of each group: counts, snapshots, clusters, bonds, events and others.
+    run : dict
+        Metadata of the run.
+    """
 
     exported = ("counts", "clusters", "events")
 

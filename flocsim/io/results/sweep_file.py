@@ -44,8 +44,19 @@ class Swept:
 
 @attrs.frozen(eq=False, repr=False)
 class SweepResults(Tables):
-    """A joined file as `flocsim.open` gives it; ``swept`` {dimension: Swept} are its keys, and
-    ``run`` has what `source_line` tells of all parts."""
+    """Joined results of a sweep, as `flocsim.open` returns them.
+
+    Attributes
+    ----------
+    path : Path
+        Name of the file.
+    swept : dict of str to Swept
+        Keys of the sweep, as dimensions.
+    groups : dict of str to Labelled
+        Joined tables.
+    run : dict
+        Flocs, preset and version of all parts.
+    """
 
     path: Path
     swept: dict[str, Swept]
@@ -58,7 +69,22 @@ class SweepResults(Tables):
         return {name: group.shared_axes for name, group in self.groups.items()}
 
     def labelled(self, group: str) -> Labelled:
-        """Return the arrays of a group: "probabilities" or "pooled", or "counts" of swarms."""
+        """Return the arrays of a group with their axes.
+
+        Parameters
+        ----------
+        group : str
+            "probabilities" or "pooled"; of swarms "counts".
+
+        Returns
+        -------
+        Labelled
+
+        Raises
+        ------
+        UsageError
+            If there is no such group.
+        """
         return self.groups[self.known(group)]
 
 

@@ -140,7 +140,7 @@ def test_a_library_of_one_measured_size_is_refused(tmp_path):
     write_star_library(tmp_path / "one.h5", vertices=(4,), ratios=(8.0,))
     shapes = ShapesConfig(source="library", file=tmp_path / "one.h5", vertices=(4,), size="own")
     with pytest.raises(
-        ConfigError, match=r"needs flocs of at least two sizes, but .* holds 1 floc of"
+        ConfigError, match=r"needs flocs of at least two sizes, but .* holds 1 floc"
     ):
         load_flocs(shapes, 1)
 

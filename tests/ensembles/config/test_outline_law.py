@@ -58,7 +58,7 @@ def test_so_do_forces_that_ask_how_bodies_are_turned(tmp_path, scene, words):
     ("scene", "more", "words"),
     [
         ('meeting = "extension"\nrate = 10.0', "", "only settling pairs can have"),
-        ('meeting = "brownian"', '[forces.thermal]\ntemperature = "298 K"', "pairs that settle"),
+        ('meeting = "brownian"', '[forces.thermal]\ntemperature = "298 K"', "only settling pairs"),
         ("", '[forces.thermal]\ntemperature = "298 K"', "cannot be combined with"),
     ],
 )

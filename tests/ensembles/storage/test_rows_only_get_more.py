@@ -72,10 +72,13 @@ def test_results_with_more_than_is_asked_for_stay_and_are_reported(finished, who
 @pytest.mark.parametrize(
     ("mixed", "said"),
     [
-        ({"scene": {"delta": [1.0, 0.5]}}, "2 conditions more"),
-        ({"scene": {"delta": [1.0]}, "replicates": 30}, "2 conditions"),
+        ({"scene": {"delta": [1.0, 0.5]}}, "2 more conditions"),
+        ({"scene": {"delta": [1.0]}, "replicates": 30}, "2 more conditions"),
         ({"scene": {"delta": [0.0, 0.5, 1.0]}, "replicates": 10}, "20 replicates of each"),
-        ({"scene": {"types": ["I", "III", "II"], "delta": [0.0]}, "replicates": 3}, "2 conditions"),
+        (
+            {"scene": {"types": ["I", "III", "II"], "delta": [0.0]}, "replicates": 3},
+            "2 more conditions",
+        ),
     ],
 )
 def test_results_that_have_more_of_one_thing_and_less_of_another_are_refused(

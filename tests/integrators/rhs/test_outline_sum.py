@@ -206,9 +206,7 @@ def test_an_overlap_beyond_d_min_is_refused_at_the_start():
     one, other = Sphere(1e-6), Sphere(3e-6)
     force = VanDerWaals(1e-20, 1e-9, law="outline")
     Pair(other, one, (4e-6 - 0.9e-9, 0.0, 0.0), force).system.check_overlaps()
-    with pytest.raises(
-        UsageError, match=r"overlapping by 2e-09 m, more than d_min = 1e-09 m of the"
-    ):
+    with pytest.raises(UsageError, match=r"overlapping by 2e-09 m, more than d_min = 1e-09 m of"):
         Pair(other, one, (4e-6 - 2e-9, 0.0, 0.0), force).system.check_overlaps()
 
 
