@@ -83,6 +83,7 @@ def commands(text):
 def words_of(command):
     """The words of a command of flocsim behind its name, without a launcher, which changes no
     result; None of other programs."""
+    command = command.removeprefix(".venv/bin/")
     if command.startswith(OTHER_PROGRAMS):
         return None
     words = shlex.split(re.sub(r"\s#.*", "", command))
@@ -180,8 +181,9 @@ def test_every_block_runs_as_pasted_in_an_empty_folder(page, in_tmp, capsys):
     if page == "README.md":
         said = capsys.readouterr().out
         flocs = re.search(r"shapes.h5: (\d+) flocs", said)
-        assert said.count(f"preset tang2014 · {flocs[1]} flocs of shapes.h5 · ") >= 3
-        assert len(list(in_tmp.glob("study-*.png"))) == 7
+        assert said.count(f"preset clay · {flocs[1]} flocs of shapes.h5 · ") >= 3
+        assert len(list(in_tmp.glob("clay-figure-*.png"))) == 4
+        assert (in_tmp / "kaolin" / "report.html").exists()
 
 
 def give(page, folder):
