@@ -204,7 +204,7 @@ def kept_words(start: Beginning, state: StudyState) -> str:
     if not count and not begun:
         return "no replicate was finished"
     others = f" and the states of {plural(begun, 'unfinished one')}" if begun else ""
-    return f"{plural(count, 'finished replicate')}{others}: saved in {start.store.journal.path}"
+    return f"{plural(count, 'finished replicate')}{others} saved in {start.store.journal.path}"
 
 
 def compile_in_turn(study, comm):

@@ -57,7 +57,7 @@ def test_a_modulus_of_one_megapascal_is_the_stiffness_of_the_paper():
     [
         ({"young": 1e6, "k_n": 20.0}, "give one of young and k_n"),
         ({"poisson": 0.2, "k_t": 2.0}, "give one of poisson and k_t"),
-        ({"restitution": 0.5, "damping_n": "critical"}, "give either restitution or damping_n"),
+        ({"restitution": 0.5, "damping_n": "critical"}, "give one of restitution and damping_n"),
         ({"poisson": 1 / 3}, "poisson must be a finite number at least 0 and below 0.333333"),
         ({"poisson": -0.1}, "poisson must be"),
         ({"restitution": 0.0}, "restitution must be a finite number above 0 and at most 1"),

@@ -18,7 +18,7 @@ def test_the_pilot_says_what_the_study_takes(tmp_path):
     text = dry_run.dry_run(spheres(tmp_path), 2, pilot=True)
     assert re.search(r"time: \d+.* on 2 ranks", text)
     assert re.search(r"estimated from (\d+) replicates, which ended: \1 A", text)
-    [hours] = re.findall(r"core-hours: (\S+) \((\S+) to (\S+)\), by", text)
+    [hours] = re.findall(r"core-hours: (\S+) \((\S+) to (\S+)\), estimated", text)
     value, low, high = map(float, hours)
     assert 0.0 < low < value < high
     assert text.splitlines()[-1].startswith("only the pilot was run (--dry-run)")

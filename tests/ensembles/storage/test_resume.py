@@ -38,7 +38,7 @@ def left(tmp_path_factory):
     folder = tmp_path_factory.mktemp("left")
     with after_chunks(30):
         ended = go_on(folder, NEW)
-    kept = f"30 finished replicates are in {folder / 'r.h5.journal'}"
+    kept = f"30 finished replicates saved in {folder / 'r.h5.journal'}"
     assert (ended.code, INTERRUPTION.kept()) == (STOPPED, kept)
     assert [path.name for path in folder.glob("r.h5*")] == ["r.h5.journal"]
     return folder / "r.h5.journal"

@@ -173,7 +173,7 @@ def test_what_is_promised_counts_the_journal_and_not_the_results(finished):
     with after_chunks(5):
         ended = go_on(finished, replicates=30)
     journal = finished / "r.h5.journal"
-    kept = f"5 finished replicates are in {journal}"
+    kept = f"5 finished replicates saved in {journal}"
     assert (ended.code, INTERRUPTION.kept()) == (STOPPED, kept)
     assert rows_in(journal) == 5
 
