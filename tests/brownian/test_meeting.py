@@ -51,7 +51,7 @@ def test_shapes_touch_with_their_outlines():
 @pytest.mark.parametrize(
     ("bodies", "forces", "release", "words"),
     [
-        ([HALF], [Thermal()], 2e-6, "one of two bodies"),
+        ([HALF], [Thermal()], 2e-6, "needs two bodies, found 1"),
         ([HALF, HALF], [StokesDrag()], 2e-6, "needs a Thermal force"),
         ([HALF, HALF], [Thermal()], 0.9e-6, "release must be between 1e-06 m"),
         ([HALF, HALF], [Thermal()], 5e-6, "release must be between"),

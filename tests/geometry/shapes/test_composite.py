@@ -166,8 +166,8 @@ def test_shapes_travel():
     ([(1.0, (0.0, 0.0))], "part 0 must begin with a shape, found 1.0"),
     ([(Sphere(1.0), (0.0, 0.0)), (Sphere(1.0), (0.0, np.nan))], "part 1 must lie at a finite"),
     ([(Sphere(1.0), 3.0)], "part 0 must lie at a finite"),
-    ([(Sphere(1.0), (0.0, 0.0)), (Sphere(1.0), (2.1, 0.0))], "part 1 of 2 touches none"),
-    ([(framed(), (0.0, 0.0)), (Sphere(0.5), (0.0, 0.0))], "part 1 of 2 touches none"),
+    ([(Sphere(1.0), (0.0, 0.0)), (Sphere(1.0), (2.1, 0.0))], "part 1 of 2 is not connected"),
+    ([(framed(), (0.0, 0.0)), (Sphere(0.5), (0.0, 0.0))], "part 1 of 2 is not connected"),
 ])  # fmt: skip
 def test_what_makes_no_body_is_refused(parts, words):
     with pytest.raises(ShapeError, match=words):
