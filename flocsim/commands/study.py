@@ -40,10 +40,12 @@ KINDS = {"clay": "clay", "tang2014": "paper", "si": "measured"}
 FIGURES = ("overview", "outcomes")
 """Figures that are drawn as files; the report has them all."""
 
+REPORT = "report.html"
 RECORD = "study.json"
 FORM: dict[str, Any] = {"source": {}, "made": {}, "shown": {}}
 """The record of a folder, as a pattern of `flocsim.io.json_text`: of what the shapes were made;
-{file: checksum} of what the study has made, "" while it makes it; {report: what it shows}."""
+{file: checksum} of what the study has made, "" while it makes it; {figure or report: the results
+that it shows}."""
 
 SECONDS = {"picture": 3.0, "replicate": 0.1, "study": 15.0}
 """CPU time of a picture, of a replicate of all conditions, and of all else in a study."""
@@ -100,9 +102,15 @@ class StudyFolder:
         path = self.path / name
         return path.exists() and self.record["made"].get(name) in ("", checksum(path))
 
-    def make(self, names: Sequence[str], *words: str) -> None:
-        """Run a command that writes these files, in the place of those that are its own."""
-        made = self.record["made"]
+    def make(self, names: Sequence[str], *words: str, of: Sequence[Path] = ()) -> None:
+        """Run a command that writes these files, in the place of those that are its own.
+
+        ``of``: the results that they show; files that are there and show them are left as they are.
+        """
+        made, shown = self.record["made"], [*map(checksum, of), __version__]
+        there = all((self.path / name).exists() for name in names)
+        if of and there and self.record["shown"].get(names[0]) == shown:
+            return
         for name in names:
             if self.is_own(name):
                 (self.path / name).unlink()
@@ -111,6 +119,7 @@ class StudyFolder:
         self.save()
         call(*words)
         made |= {name: checksum(self.path / name) for name in names}
+        self.record["shown"][names[0]] = shown
         self.save()
 
 
@@ -165,20 +174,20 @@ def make_study(args: Namespace) -> int:
     work = SECONDS["picture"] * len(pictures)
     work += SECONDS["replicate"] * (args.replicates or 100) * len(presets)
     lasts = duration(work / args.jobs + SECONDS["study"] * len(presets))
-    codes: list[int] = []
-    said: list[str] = []
     with open_folder(Path(args.output)) as folder:
-        if not (folder.path / "shapes.h5").exists():
-            print(f"takes about {lasts}, and a minute or two more the first time that flocsim runs")
+        print(f"takes about {lasts}, and a minute or two more the first time that flocsim runs")
         fit_shapes(args, pictures, folder)
-        for preset in presets:
-            report = f"report-{preset}.html" if said else "report.html"
-            codes.append(run_preset(args, preset, report, folder))
-            kind, file = open_kind(folder.path / f"{preset}.h5")
+        code = max(run_preset(args, preset, folder) for preset in presets)
+        results = [folder.path / f"{preset}.h5" for preset in presets]
+        page = typed(folder.path / REPORT)
+        words = ["report", *map(typed, results), "-o", page, *["--overwrite"] * args.overwrite]
+        folder.make([REPORT], *words, of=results)
+        for path in results:
+            kind, file = open_kind(path)
             found = kind.read(file)
-            said += ["", kind.setting(found), kind.answer(found), str(folder.path / report)]
-    print(*said, sep="\n")
-    return max(codes)
+            print("", kind.setting(found), kind.answer(found), sep="\n")
+        print(f"\n{page}")
+    return code
 
 
 def typed(path: str | os.PathLike) -> str:
@@ -235,12 +244,12 @@ def fit_shapes(args: Namespace, pictures: Sequence[Path], folder: StudyFolder) -
     folder.save()
 
 
-def run_preset(args: Namespace, preset: str, report: str, folder: StudyFolder) -> int:
-    """Do what is missing of the study with a preset: config, results, figures and report; return
-    the exit code of its run."""
-    shapes, config, results, figures, page = (
+def run_preset(args: Namespace, preset: str, folder: StudyFolder) -> int:
+    """Do what is missing of the study with a preset: config, results and figures; return the exit
+    code of its run."""
+    shapes, config, results, figures = (
         typed(folder.path / name)
-        for name in ("shapes.h5", f"{preset}.toml", f"{preset}.h5", "figures", report)
+        for name in ("shapes.h5", f"{preset}.toml", f"{preset}.h5", "figures")
     )
     rule = ["--overwrite"] * args.overwrite
     if not Path(config).exists():
@@ -252,14 +261,7 @@ def run_preset(args: Namespace, preset: str, report: str, folder: StudyFolder) -
     words += ["--jobs", str(args.jobs)] * (args.jobs > 1)
     words += ["--replicates", str(args.replicates)] * (args.replicates is not None)
     code = call(*words, *(word for each in args.settings for word in ("--set", each)))
-    shown = [preset, checksum(Path(results)), __version__]
-    if folder.record["shown"].get(report) == shown and Path(page).exists():
-        print(f"{page} shows these results already")
-        return code
     drawn = [f"figures/{preset}-{name}.png" for name in FIGURES]
-    words = ["plot", results, "--output-dir", figures, "--figures", ",".join(FIGURES)]
-    folder.make(drawn, *words, *rule)
-    folder.make([report], "report", results, "-o", page, *rule)
-    folder.record["shown"][report] = shown
-    folder.save()
+    words = ["plot", results, "--output-dir", figures, "--figures", ",".join(FIGURES), *rule]
+    folder.make(drawn, *words, of=[Path(results)])
     return code

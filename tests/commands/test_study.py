@@ -45,7 +45,7 @@ def test_study_ends_with_an_answer(picture, capfd):
     assert study() == 0
     told = capfd.readouterr().out
     assert steps(told) == ["fit", "init", "ensemble", "plot", "report"]
-    *_, setting, answer, page, _ = told.split("\n")
+    *_, setting, answer, _, page, _ = told.split("\n")
     assert setting == "Preset clay: real weight, sea water of 15 °C and 35 g/kg."
     assert answer.startswith("Of pairs of spheres that touch, 100 % [")
     assert page == "mine/report.html" and (picture / page).exists()

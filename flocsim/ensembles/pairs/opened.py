@@ -370,4 +370,4 @@ def outlines_of(path: str | os.PathLike, allowed: Allowed) -> dict[str, Shape]:
         flocs = flocs_of(StudyResults(path, allowed).config)
     except FlocsimError:
         return {}
-    return {floc.name: floc.shapes[max(floc.shapes)] for floc in flocs}
+    return {floc.name: floc.shapes[max(floc.shapes)] for floc in flocs if floc.shapes}
