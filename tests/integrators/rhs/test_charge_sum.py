@@ -172,7 +172,7 @@ def test_what_has_no_bound_takes_a_least_gap():
     with pytest.raises(RangeError, match="between unlike potentials"):
         DoubleLayer((15e-3, 30e-3), law="outline", boundary="potential")
     layer(boundary="potential")
-    with pytest.raises(RangeError, match='is of law = "outline", found law = "spheres"'):
+    with pytest.raises(RangeError, match='needs law = "outline", found law = "spheres"'):
         DoubleLayer(boundary="potential")
 
 

@@ -212,7 +212,7 @@ def test_an_overlap_beyond_d_min_is_refused_at_the_start():
 
 def test_a_swarm_refuses_them():
     bodies = [Body(Sphere(1e-6), density=2650.0)]
-    with pytest.raises(UsageError, match="acts along outlines, and a swarm"):
+    with pytest.raises(UsageError, match="acts along outlines, but a swarm"):
         Swarm(bodies, [VanDerWaals(law="outline")])
 
 
