@@ -139,7 +139,7 @@ def test_how_far_a_swarm_is_is_told_while_it_runs(tmp_path, often, capsys):
     lines = [line for line in output.splitlines() if "; swarm " in line]
     assert lines
     for line in lines:
-        assert re.search(r"\d of 8 snapshots.*; swarm [01] at [\d.e-]+ s, \d+ steps on$", line)
+        assert re.search(r"\d of 8 snapshots.*; swarm [01] at [\d.e-]+ s, \d+ steps further$", line)
     assert "\r" not in output
 
 
@@ -247,7 +247,7 @@ def test_all_that_reads_the_file(finished, in_tmp, capsys):
     file = str(finished / "swarm.h5")
     assert main(["info", file]) == 0
     said = capsys.readouterr().out
-    assert "2 of 12 bodies, 2 were completed" in said and "means over 2 swarms" in said
+    assert "2 of 12 bodies, 2 completed" in said and "means over 2 swarms" in said
     assert main(["plot", file, "--animation", "s.gif"]) == 0
     names = {path.name for path in in_tmp.iterdir()}
     assert names == {
