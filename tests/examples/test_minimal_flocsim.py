@@ -31,7 +31,7 @@ def plain():
     """The example uncompiled: a few steps take less time than compiling it."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numba.config, "DISABLE_JIT", True)
-        yield loaded()
+        return loaded()
 
 
 class Impact:
