@@ -23,8 +23,8 @@ from typing import Any
 
 
 @contextlib.contextmanager
-def deferred(number: int) -> Iterator[None]:
-    """Answer a signal at the end of the block if it comes inside, whichever thread receives it.
+def deferred(*numbers: int) -> Iterator[None]:
+    """Answer signals at the end of the block if they come inside, whichever thread receives them.
 
     Blocking it in this thread would not do: the system hands it to another one then, of a library
     of linear algebra for example, and Python calls its handler here all the same.
@@ -33,12 +33,13 @@ def deferred(number: int) -> Iterator[None]:
         yield
         return
     received: list[int] = []
-    before = signal.signal(number, lambda number, _: received.append(number))
+    before = {k: signal.signal(k, lambda number, _: received.append(number)) for k in numbers}
     try:
         yield
     finally:
-        signal.signal(number, before)
-        if received:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for number in dict.fromkeys(received):
             signal.raise_signal(number)
 
 

@@ -32,7 +32,7 @@ from flocsim.io.journal import Lock
 from flocsim.io.json_text import read_json
 from flocsim.io.seals import digest_of, held
 from flocsim.io.terminal import duration
-from flocsim.process import INTERRUPTED, STOPPED, WITHHELD, handle
+from flocsim.process import INTERRUPTED, SIGNALS, STOPPED, WITHHELD, deferred, handle
 
 KINDS = {"clay": "clay", "tang2014": "paper", "si": "measured"}
 """Presets, and the kind of `flocsim init` with each."""
@@ -202,12 +202,16 @@ def call(*words: str) -> int:
     """
     print(f"\n$ {shlex.join(['flocsim', *words])}", flush=True)
     # In a process group of its own, since Ctrl-C in the midst of imports shows where it came.
-    process = subprocess.Popen([*program(), *words], process_group=0)
+    # A signal waits until the process is known, as nobody could stop it otherwise.
+    process = None
     try:
+        with deferred(*SIGNALS):
+            process = subprocess.Popen([*program(), *words], process_group=0)
         code = process.wait()
     except KeyboardInterrupt:
-        process.terminate()
-        process.wait()
+        if process is not None:
+            process.terminate()
+            process.wait()
         raise
     if code in (STOPPED, INTERRUPTED) or code < 0:
         raise KeyboardInterrupt(f"stopped with flocsim {words[0]}")

@@ -191,7 +191,10 @@ class Swarm:
 
     Parameters
     ----------
-    bodies, forces, integrator, fluid
+    bodies : sequence of Body
+    forces : sequence of Force
+    integrator : Integrator
+    fluid : Fluid
         As for a System.
     box : (float or None, float or None), optional
         Width and height [m] of a periodic box; None for an axis that is not periodic.

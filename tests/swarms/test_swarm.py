@@ -134,7 +134,7 @@ def test_what_a_swarm_cannot_do_is_said():
     with pytest.raises(UsageError, match="the box is 2e-05 m wide"):
         Swarm(few, forces(), box=(2e-5, None))
     with pytest.raises(
-        UsageError, match="the flow varies along y, along which the box is periodic"
+        UsageError, match="the flow varies along y, but the box is periodic along y"
     ):
         Swarm(few, forces(), fluid=Fluid(gradient=(0.0, 1.0, 0.0, 0.0)), box=(SIDE, SIDE))
     with pytest.raises(UsageError, match="at least one body that moves"):

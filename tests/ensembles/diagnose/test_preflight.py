@@ -84,7 +84,9 @@ def test_a_value_is_rounded_up():
 
 
 def test_heavy_flocs_are_refused_with_the_stiffness_that_would_do(tmp_path):
-    with pytest.raises(ConfigError, match=r"I: an impact at 242\.9 mm/s is 2\.12 um deep") as told:
+    with pytest.raises(
+        ConfigError, match=r"I: an impact at 242\.9 mm/s makes bodies overlap by 2\.12 um"
+    ) as told:
         check_study(small_config(tmp_path, HEAVY))
     line = str(told.value)
     assert "\n" not in line and "more than the 1 um" in line
@@ -95,7 +97,7 @@ def test_heavy_flocs_are_refused_with_the_stiffness_that_would_do(tmp_path):
         if fits:
             check_study(config)
         else:
-            with pytest.raises(ConfigError, match="deep"):
+            with pytest.raises(ConfigError, match="makes bodies overlap by"):
                 check_study(config)
 
 
@@ -107,7 +109,7 @@ def test_without_damping_impacts_are_deeper(tmp_path):
     loose = {"damping_n": 0.0}
     over = {"bodies": {"surface_density": 8.0}, "forces": {"contact": loose}}
     check_study(small_config(tmp_path, {"bodies": {"surface_density": 8.0}}))
-    with pytest.raises(ConfigError, match="deep"):
+    with pytest.raises(ConfigError, match="makes bodies overlap by"):
         check_study(small_config(tmp_path, over))
 
 
