@@ -77,8 +77,8 @@ def test_info_and_plot_of_results_that_are_not_there_yet(in_tmp, capsys):
         told = capsys.readouterr().out
         assert "unfinished: 175 of 320 replicates so far" in told
         assert "0 to 40 in each of 8 conditions, 40 planned" in told
-    assert main(["plot", "r.h5", "--figures", "delta,efficiency"]) == 0
-    assert capsys.readouterr().out.split() == ["r-delta.png", "r-efficiency.png"]
+    assert main(["plot", "r.h5", "--figures", "delta,outcomes"]) == 0
+    assert capsys.readouterr().out.split() == ["r-delta.png", "r-outcomes.png"]
     journal.release()
 
 
