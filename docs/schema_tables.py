@@ -1,5 +1,5 @@
 """Write the tables of docs/config.md and docs/results.md from the schemas, docs/commands.md from
-the parser.
+the parser, docs/glossary.md from the words of the report.
 
 This is a hook of mkdocs: each line `<!-- from the schema: NAME -->` of a page becomes the part of
 this name. `python docs/schema_tables.py config` prints the page as Markdown, with its tables.
@@ -12,11 +12,13 @@ import itertools
 import re
 import sys
 import textwrap
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
 import attrs
 
+import flocsim
 from flocsim.__main__ import make_parser
 from flocsim.ensembles.config import SCENE_WORDS
 from flocsim.ensembles.config.schema import FORCES, SCENES, STUDY_KEYS, TABLES, Config, keys_of
@@ -194,7 +196,16 @@ def with_parts(page: str, parts: Mapping[str, str]) -> str:
     return MARK.sub(lambda match: parts[match[1]].strip(), page)
 
 
-PAGES = {"config.md": config_parts, "results.md": results_parts, "commands.md": command_parts}
+def glossary_parts() -> dict[str, str]:
+    """Return {"words": the table of words} for docs/glossary.md."""
+    with (Path(flocsim.__file__).parent / "commands/templates/glossary.toml").open("rb") as file:
+        return {"words": markdown_table(["word", "meaning"], tomllib.load(file).items())}
+
+
+PAGES = {
+    "config.md": config_parts, "results.md": results_parts, "commands.md": command_parts,
+    "glossary.md": glossary_parts,
+}  # fmt: skip
 """Page → what makes its parts."""
 
 
