@@ -401,7 +401,7 @@ class Differences(Tables):
             Name of the quantity; the first by default.
         numerics : bool
             Add how much each difference would change if all runs were exact. This is also added if
-            it exceeds half of an interval somewhere.
+            it exceeds half of the widest interval somewhere.
 
         Returns
         -------
@@ -414,7 +414,7 @@ class Differences(Tables):
         width = arrays["difference_high"] - arrays["difference_low"]
         known = "change_low" in arrays
         error = np.maximum(-arrays["change_low"], arrays["change_high"]) if known else np.zeros(1)
-        shown = known and (numerics or bool(np.any(error > 0.5 * width)))
+        shown = known and (numerics or bool(np.any(error > 0.5 * np.nanmax(width, initial=0.0))))
 
         def row(place: tuple[int, ...]) -> Sequence[str]:
             at = {name: float(values[place]) for name, values in arrays.items()}
