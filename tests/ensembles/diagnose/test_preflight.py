@@ -89,7 +89,7 @@ def test_heavy_flocs_are_refused_with_the_stiffness_that_would_do(tmp_path):
     ) as told:
         check_study(small_config(tmp_path, HEAVY))
     line = str(told.value)
-    assert "\n" not in line and "more than the 1 um" in line
+    assert "\n" not in line and "valid only up to 1 um" in line
     wanted = float(re.search(r"k_n (\S+) N/m or more", line)[1])
     for factor, fits in ((1.0, True), (0.95, False)):
         over = HEAVY | {"forces": {"contact": {"k_n": factor * wanted}}}
