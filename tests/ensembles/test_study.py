@@ -51,10 +51,11 @@ def test_a_replicate_that_is_given_up_has_no_row(study, monkeypatch):
     assert study.run(0, 4, 0.0, 0, halted=lambda: True) is None
 
 
-def test_what_runs_out_of_steps_is_tried_again_with_more(study, tmp_path):
-    full = study.run(0, 16, 0.0, 0)
+def test_what_runs_out_of_steps_is_tried_again_with_more(tmp_path):
+    once = {"check_share": 0.0}  # a re-run needs more steps
+    full = small_study(tmp_path, {"integrator": once}).run(0, 16, 0.0, 0)
     taken = full["steps"] + full["rejected"]
-    few = small_study(tmp_path, {"integrator": {"max_steps": taken // 3}})
+    few = small_study(tmp_path, {"integrator": once | {"max_steps": taken // 3}})
     assert few.run(0, 16, 0.0, 0) == full
     # Its motion is that of the second attempt, too.
     motion = replicate_of(0, (0, 16, 0.0), few)
