@@ -152,7 +152,7 @@ def test_the_equivalent_spheres_are_said(tmp_path):
 
 
 def test_a_study_is_run_reported_resumed_and_dealt_to_processes(folder, capsys):
-    assert main(["ensemble", "study.toml", "--dry-run"]) == 0
+    assert main(["ensemble", "study.toml", "--dry-run", "--verbose"]) == 0
     told = capsys.readouterr().out
     assert "brownian: from 2 to 4 (r_i + r_j) apart" in told and "W = " in told
     assert main(["ensemble", "study.toml"]) == 0

@@ -71,7 +71,8 @@ def study_lines(config: Config, ranks: int) -> list[str]:
     accuracy = f"tolerance {method.tolerance:g} m" if method.tolerance < math.inf else "fixed step"
     total, vertices = count * config.replicates, ", ".join(map(str, shapes.vertices))
     return [
-        f"{total} pairs: {count} conditions of {config.replicates} replicates, seed {config.seed}, "
+        f"{plural(total, 'pair')}: {plural(count, 'condition')} of "
+        f"{plural(config.replicates, 'replicate')}, seed {config.seed}, "
         f"on {plural(ranks, 'rank')}; results in {config.output.file}",
         f"  conditions: types {', '.join(scene.names)}; N = {vertices}; {meeting}",
         f"  flocs: {', '.join(flocs)}",
