@@ -1,5 +1,6 @@
 """`flocsim study`: from pictures to a report, in a folder of its own."""
 
+import os
 import re
 import shlex
 import signal
@@ -116,7 +117,11 @@ def test_study_without_flocs_ends_in_a_line(words, said, picture):
 
 def test_stopped_study_says_how_it_goes_on(picture):
     command = [sys.executable, "-m", "flocsim", "study", *WORDS, *FEW]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    # Where this Python is on the PATH, the command that goes on has its short name.
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        env=os.environ | {"PATH": os.defpath},
+    )  # fmt: skip
     assert process.stdout is not None
     while not process.stdout.readline().startswith("$ flocsim fit"):
         pass
