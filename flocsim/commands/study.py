@@ -30,7 +30,7 @@ from flocsim.io.arguments import whole
 from flocsim.io.files import make_folder, write_file
 from flocsim.io.journal import Lock
 from flocsim.io.json_text import read_json
-from flocsim.io.seals import digest_of, held
+from flocsim.io.seals import held, sha256_of
 from flocsim.io.terminal import duration
 from flocsim.process import INTERRUPTED, SIGNALS, STOPPED, WITHHELD, deferred, handle
 
@@ -100,14 +100,14 @@ class StudyFolder:
     def is_own(self, name: str) -> bool:
         """Return True if a file is there as the study has made it, or was making it."""
         path = self.path / name
-        return path.exists() and self.record["made"].get(name) in ("", checksum(path))
+        return path.exists() and self.record["made"].get(name) in ("", sha256_of(path))
 
     def make(self, names: Sequence[str], *words: str, of: Sequence[Path] = ()) -> None:
         """Run a command that writes these files, in the place of those that are its own.
 
         ``of``: the results that they show; files that are there and show them are left as they are.
         """
-        made, shown = self.record["made"], [*map(checksum, of), __version__]
+        made, shown = self.record["made"], [*map(sha256_of, of), __version__]
         there = all((self.path / name).exists() for name in names)
         if of and there and self.record["shown"].get(names[0]) == shown:
             return
@@ -118,14 +118,9 @@ class StudyFolder:
                 made[name] = ""
         self.save()
         call(*words)
-        made |= {name: checksum(self.path / name) for name in names}
+        made |= {name: sha256_of(self.path / name) for name in names}
         self.record["shown"][names[0]] = shown
         self.save()
-
-
-def checksum(path: Path) -> str:
-    """Return the checksum of a file as text."""
-    return digest_of(path.read_bytes(), 16).hex()
 
 
 @contextlib.contextmanager
@@ -223,7 +218,7 @@ def call(*words: str) -> int:
 def fit_shapes(args: Namespace, pictures: Sequence[Path], folder: StudyFolder) -> None:
     """Fit the flocs of the pictures, unless the folder has them; UsageError where it has others."""
     source = {
-        "pictures": sorted([path.name, checksum(path)] for path in pictures),
+        "pictures": sorted([path.name, sha256_of(path)] for path in pictures),
         "pixel_size": args.pixel_size,
         "options": args.fit,
     }

@@ -118,7 +118,8 @@ def efficiency_lines(results: Results) -> list[str]:
     for t, v in np.ndindex(results.shape[:2]):
         if np.isfinite(planar[0][t, v]):
             first, second = (
-                f"{e[t, v]:.3f} [{lo[t, v]:.3f}, {hi[t, v]:.3f}]" for e, lo, hi in (planar, axial)
+                with_interval(float(e[t, v]), float(low[t, v]), float(high[t, v]))
+                for e, low, high in (planar, axial)
             )
             lines.append(f"type {results.types[t]}, N = {results.vertices[v]}: {first}   {second}")
     head = "Aggregations per approach over δ, in the plane and axially [95 %]:"

@@ -23,6 +23,12 @@ BLOCK = 2**20
 """Bytes that are read at a time."""
 
 
+def sha256_of(path: str | os.PathLike) -> str:
+    """Return the SHA-256 checksum of a file, in hexadecimal digits; it is read piece by piece."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def digest_of(data: bytes | memoryview, size: int = 32) -> bytes:
     """Return the blake2b digest of some data, of so many bytes."""
     return hashlib.blake2b(data, digest_size=size).digest()

@@ -12,6 +12,7 @@ from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.errors import ConfigError
 from flocsim.io.results.events import AGGREGATED, HOOK
+from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.run_group import stored
 from flocsim.io.results.schema import Results
 from flocsim.water import ZERO_CELSIUS
@@ -27,7 +28,7 @@ PHYSICS = ("bodies", "fluid", "forces", "zone")
 
 
 def answer_sentence(results: Results) -> str:
-    """Return what a study of pairs found, in one sentence; "" for rates.
+    """Return what a study of pairs, or of rates, found in one sentence; "" where it is unknown.
 
     Pr[A] and its 95 % interval at the largest N, and of the equivalent spheres, are those of the
     table `pooled`: every decided collision of a type counts once, at whichever displacement. Of
@@ -37,7 +38,9 @@ def answer_sentence(results: Results) -> str:
     >>> answer_sentence(flocsim.open("clay.h5"))  # doctest: +SKIP
     'Of pairs that touch, 41 % [36, 46] stick (N = 64, real outlines); spheres of the same size: 100 %.'
     """  # noqa: E501
-    if results.kernel is not None or "pr_a" not in results.pooled:
+    if results.kernel is not None:
+        return rates_sentence(results.kernel)
+    if "pr_a" not in results.pooled:
         return ""
     counts = [int(count) for count in results.vertices]
     most = int(np.argmax(counts))
@@ -55,6 +58,17 @@ def answer_sentence(results: Results) -> str:
     if found and spheres and counts[most] > 1:
         words += f"; spheres of the same size: {spheres}"
     return "".join([words, *left_out(table), "."])
+
+
+def rates_sentence(kernel: Kernel) -> str:
+    """Return the lowest and the highest efficiency α of each mechanism at the largest N."""
+    most, words = kernel.vertices.argmax(), []
+    for mechanism, alpha in zip(kernel.mechanisms, kernel.arrays["alpha"], strict=True):
+        if np.isfinite(alpha[most]).any():
+            least, largest = 100.0 * np.nanmin(alpha[most]), 100.0 * np.nanmax(alpha[most])
+            words.append(f"{least:.0f} to {largest:.0f} % by {mechanism}")
+    which = f"N = {kernel.vertices[most]}, over all sizes"
+    return f"Of pairs that touch, these stick ({which}): {', '.join(words) or 'unknown'}."
 
 
 def outlines_of(results: Results) -> str:

@@ -114,7 +114,7 @@ class PairFiles(Contents):
 
     title = "results of a collision ensemble"
     on_examples = ON_EXAMPLES
-    first = ("outcomes", "delta", "bonds", "kernels", "efficiency")
+    first = ("outcomes", "delta", "kernels", "efficiency")
     file = schema.RESULTS
     compared = schema.COMPARED
     swept = ("probabilities", "pooled")
@@ -130,7 +130,7 @@ class PairFiles(Contents):
     compare = later("ensembles.pairs.comparison", "compare")
     examples = later("ensembles.pairs.opened", "examples_of")
     outlines = later("ensembles.pairs.opened", "outlines_of")
-    pairs_answer = later("ensembles.pairs.answer", "answer_sentence")
+    answer = later("ensembles.pairs.answer", "answer_sentence")
     setting = later("ensembles.pairs.answer", "setting_sentence")
     verdict = staticmethod(report.verdict)
     read = staticmethod(read_results)
@@ -161,19 +161,6 @@ class PairFiles(Contents):
         return "\n".join(filter(None, [*lines, report.outlines_line(results)]))
 
     detailed = table
-
-    def answer(self, found: schema.Results) -> str:
-        """Return what a study of pairs, or of rates, found in one sentence."""
-        kernel = found.kernel
-        if kernel is None:
-            return self.pairs_answer(found)
-        most, words = kernel.vertices.argmax(), []
-        for mechanism, alpha in zip(kernel.mechanisms, kernel.arrays["alpha"], strict=True):
-            if np.isfinite(alpha[most]).any():
-                least, largest = 100.0 * np.nanmin(alpha[most]), 100.0 * np.nanmax(alpha[most])
-                words.append(f"{least:.0f} to {largest:.0f} % by {mechanism}")
-        which = f"N = {kernel.vertices[most]}, over all sizes"
-        return f"Of pairs that touch, these stick ({which}): {', '.join(words) or 'unknown'}."
 
     def rows(self, results: schema.Results) -> list[list[str]]:
         """Return the table of every condition as cells; of rates there is the text."""

@@ -5,7 +5,6 @@ was found, with its position and size, so that it is never applied to other ones
 """
 
 import contextlib
-import hashlib
 import io
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,6 +18,7 @@ from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.reading import check_file
 from flocsim.io.images.regions import Region
 from flocsim.io.json_text import read_json
+from flocsim.io.seals import sha256_of
 
 BY_EYE = "rejected by eye"
 KEEP, REJECT = "keep", "reject"
@@ -50,8 +50,7 @@ def checksum_of(path: Path) -> str:
     """Return the SHA-256 of a file; "" where it cannot be read: whoever decodes it says why."""
     with contextlib.suppress(OSError, ValueError):
         if path.is_file():
-            with open(path, "rb") as file:
-                return hashlib.file_digest(file, "sha256").hexdigest()
+            return sha256_of(path)
     return ""
 
 
