@@ -184,7 +184,7 @@ class Fluid:
     @property
     def words(self) -> str:
         """Description of the water and of its derived properties; "" if it is not described."""
-        said = [f"{self.warmth - water.ZERO_CELSIUS:.4g} degC"]
+        said = [f"{self.warmth - water.ZERO_CELSIUS:.4g} °C"]
         if self.salinity is not None:
             said.append(f"{self.salinity:g} g/kg of salt")
         if self.ionic_strength is not None:

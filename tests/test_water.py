@@ -69,7 +69,7 @@ def test_salt_alone_is_at_room_temperature():
 
 def test_words_of_water():
     words = Fluid(temperature="15 °C", salinity=35.0).words
-    assert words.startswith("water of 15 degC and 35 g/kg of salt: viscosity 1.22 mPa s")
+    assert words.startswith("water of 15 °C and 35 g/kg of salt: viscosity 1.22 mPa s")
     assert words.endswith("Debye length 0.335 nm")
     assert "ionic strength of 0.001 mol/l" in Fluid(ionic_strength="1 mmol/l").words
 

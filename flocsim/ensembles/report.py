@@ -108,22 +108,20 @@ def graze_lines(delta: Sequence[float] | np.ndarray) -> list[str]:
 
 
 def efficiency_lines(results: Results) -> list[str]:
-    """Return lines on efficiencies with their 95 % intervals: the aggregations per approach
+    """Return a table of efficiencies with their 95 % intervals: the aggregations per approach
     integrated over delta; none where it does not reach from 0 to 1."""
-    table, delta = results.probabilities, results.delta
-    planar, axial = efficiency(table, delta, False), efficiency(table, delta, True)
-    if planar is None or axial is None:
+    known = [efficiency(results.probabilities, results.delta, axial) for axial in (False, True)]
+    if None in known:
         return []
-    lines = []
-    for t, v in np.ndindex(results.shape[:2]):
-        if np.isfinite(planar[0][t, v]):
-            first, second = (
-                with_interval(float(e[t, v]), float(low[t, v]), float(high[t, v]))
-                for e, low, high in (planar, axial)
-            )
-            lines.append(f"type {results.types[t]}, N = {results.vertices[v]}: {first}   {second}")
-    head = "Aggregations per approach over δ, in the plane and axially [95 %]:"
-    return [head, *lines] if lines else []
+    found = np.array(known)  # (planar or axial, value or end, type, vertices)
+    rows = [
+        [results.types[t], str(results.vertices[v]),
+         *(with_interval(value[t, v], low[t, v], high[t, v]) for value, low, high in found)]
+        for t, v in np.ndindex(results.shape[:2]) if np.isfinite(found[0, 0, t, v])
+    ]  # fmt: skip
+    heads = ["type", "N", "planar [low, high]", "axial [low, high]"]
+    about = "Efficiency: fraction of approaches that aggregate, over δ (planar) or δ² (axial)."
+    return ["", *aligned([heads, *rows]), about] if rows else []
 
 
 RECTILINEAR = (
@@ -310,13 +308,6 @@ def numerics_line(results: Results) -> str:
         f"Numerical error: {runs} {checked} re-runs changed its outcome; Pr[A] is uncertain by at "
         f"most ±{most:.3f} in any condition (95 %)."
     )
-
-
-def third_line(results: Results) -> str:
-    """Return how many replicates were run a third time, and how many of these flipped."""
-    table = results.probabilities
-    thrice, late = (int(table[name].sum()) for name in ("n_third", "n_third_flipped"))
-    return f"{thrice} of them were run a third time; {late} of these ended otherwise once more"
 
 
 def outlines_line(results: Results) -> str:

@@ -84,25 +84,29 @@ def test_answer_rounds_nothing_to_all_or_none(stick, shown):
     assert f"touch, {shown} [" in answer_sentence(found)
 
 
-def setting_of(config, radii=None, **overrides):
+def setting_of(config, **overrides):
     """The sentence of a study that was run with this config."""
     run = {"config": config, "overrides": json.dumps(overrides)}
-    return setting_sentence(results({("I", 1): [A]}, (1,), run=run, radii=radii))
+    return setting_sentence(results({("I", 1): [A]}, (1,), run=run))
 
 
 @pytest.mark.parametrize(
     ("config", "sentence"),
     [
-        ("preset = 'clay'", "Preset clay: real weight, sea water of 15 °C and 35 g/kg."),
+        (
+            "preset = 'clay'",
+            "Preset clay: real weight, water of 15 °C and 35 g/kg of salt, surface potential "
+            "15 mV, Hamaker constant 2e-20 J.",
+        ),
         (
             "preset = 'clay'\n[fluid]\nsalinity = 5.0",
-            "Preset clay with values of its own for fluid: real weight, brackish water of 15 °C "
-            "and 5 g/kg.",
+            "Preset clay with values of its own for fluid: real weight, water of 15 °C and 5 g/kg "
+            "of salt, surface potential 15 mV, Hamaker constant 2e-20 J.",
         ),
         (
             "preset = 'si'\n[fluid]\ntemperature = '10 degC'\nionic_strength = '10 mmol/l'",
-            "Preset si with values of its own for fluid: 2650 kg/m³, water of 10 °C and 10 mmol/l "
-            "of salt.",
+            "Preset si with values of its own for fluid and forces: 2650 kg/m³, water of 10 °C and "
+            "an ionic strength of 0.01 mol/l, surface potential 15 mV, Hamaker constant 4.7e-20 J.",
         ),
         ("not TOML", ""),
     ],
@@ -112,12 +116,11 @@ def test_setting_names_preset_weight_and_water_of_the_config(config, sentence):
 
 
 def test_setting_says_how_heavy_the_flocs_of_the_paper_are():
-    assert setting_of("preset = 'tang2014'", radii=[23.02e-6]) == (
-        "Preset tang2014: 2 kg/m² of projected area, 65 times as dense as water, no buoyancy, "
-        "water of 0.89 mPa s."
+    assert setting_of("preset = 'tang2014'").startswith(
+        "Preset tang2014: 2 kg/m² of projected area, no buoyancy, water of 0.89 mPa s, surface"
     )
 
 
 def test_setting_heeds_values_laid_over_the_config():
     found = setting_of("preset = 'tang2014'", preset="clay", fluid={"temperature": 283.15})
-    assert found.endswith("own for fluid: real weight, sea water of 10 °C and 35 g/kg.")
+    assert "own for fluid: real weight, water of 10 °C and 35 g/kg of salt, surface" in found

@@ -278,10 +278,9 @@ class IntegratorConfig:
     )
     """Fraction of the replicates that are run again at a 100 times tighter tolerance (with a fixed
     step: at a quarter of it); the outcomes that change give the numerical error of the
-    probabilities. "auto": of n replicates 1.96 √(n + 3.84) − 3.84, which makes the interval of
-    a flip rate of 0 as narrow as a sampling interval; where that is more than 16, at most 3.5 %
-    and at least 1 %. Hooks, rests and misses, which flip most often, are run again three times as
-    often. One in sixteen of these runs is repeated a third time at an even tighter tolerance. 0:
+    probabilities. "auto": the first 24 of each condition, and 3.5 % where
+    that is more. Hooks, rests and misses, which flip most often, are run again three times as
+    often. One in eight of these runs is repeated a third time at an even tighter tolerance. 0:
     none."""
 
     def __attrs_post_init__(self):

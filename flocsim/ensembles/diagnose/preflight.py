@@ -16,7 +16,7 @@ from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.equivalent import kinds, sphere_pairs
 from flocsim.ensembles.collision.flocs import Floc, read_flocs
 from flocsim.ensembles.collision.outcomes import OBSERVER
-from flocsim.ensembles.config.schema import PRESETS, Config
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import RUN
 from flocsim.errors import ConfigError, KernelError
 from flocsim.explain import pairs_of
@@ -186,10 +186,13 @@ def rounded_up(value: float) -> float:
     return float(f"{math.ceil(value / unit * (1.0 - 1e-12)) * unit:.2g}")
 
 
+OF_THE_PAPER, PAPER_WEIGHT = ("tang2014", "tang2014-literal"), 2.0
+"""Presets with the paper's mass per projected area [kg/m²]."""
+
 IMPLIED = (
     "preset tang2014 gives flocs the paper's 2 kg/m2 of projected area, 65 to 325 times as dense "
     "as water at its sizes: they settle too fast for Stokes's drag, and shape decides the outcome. "
-    'At real weight (preset = "si") whatever touches stays together: see docs/presets.md'
+    'At real weight (presets "clay" and "si") whatever touches stays together: see docs/presets.md'
 )
 """Stands for the doubt about the drag that the paper's preset implies; no run repeats it."""
 
@@ -213,8 +216,7 @@ def config_warnings(
         forces=tuple(f"forces.{name}" for name, force in forces if id(force) in known),
     )  # fmt: skip
     lines = plausibility_warnings(systems, names)
-    weight = PRESETS.get(config.preset or "", {}).get("bodies", {}).get("surface_density")
-    if weight is not None and weight == config.bodies.surface_density:
+    if config.preset in OF_THE_PAPER and config.bodies.surface_density == PAPER_WEIGHT:
         lines = [IMPLIED, *(line for line in lines if "Re = " not in line)]
     return lines
 

@@ -1,7 +1,9 @@
 """What a study of pairs says in one sentence, and of which flocs and which water it says so."""
 
+import contextlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,17 +13,20 @@ from flocsim.ensembles.config.schema import PRESETS, BodiesConfig
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.errors import ConfigError
+from flocsim.fields import read_number
 from flocsim.io.results.events import AGGREGATED, HOOK
 from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.run_group import stored
 from flocsim.io.results.schema import Results
-from flocsim.water import ZERO_CELSIUS
-
-SEA_WATER = 30.0
-"""Salinity [g/kg] from which water is called that of the sea, as oceanographers do."""
 
 MOST_HANGING = 0.005
 """Fraction of the aggregated pairs up to which those that hang are not mentioned."""
+
+SURFACES = (
+    ("double_layer", "potential", "V", 1e3, "surface potential {:.3g} mV"),
+    ("van_der_waals", "hamaker", "J", 1.0, "Hamaker constant {:.2g} J"),
+)
+"""Force, key, unit, factor and words of what is said of the surfaces."""
 
 PHYSICS = ("bodies", "fluid", "forces", "zone")
 """Tables whose values a preset gives."""
@@ -127,11 +132,12 @@ def left_out(table: Mapping[str, np.ndarray]) -> Iterator[str]:
 
 
 def setting_sentence(results: Results) -> str:
-    """Return of which preset, weight and water a study is, from the config that it was run with;
-    "" where the results have none that can be read.
+    """Return of which preset, weight, water and surfaces a study is.
+
+    All is from the config that it was run with; "" where the results have none that can be read.
 
     >>> setting_sentence(flocsim.open("clay.h5"))  # doctest: +SKIP
-    'Preset clay: real weight, sea water of 15 °C and 35 g/kg.'
+    'Preset clay: real weight, water of 15 °C and 35 g/kg of salt, surface potential 15 mV, …'
     """
     try:
         given = lay_over(
@@ -140,43 +146,37 @@ def setting_sentence(results: Results) -> str:
     except (KeyError, ValueError, ConfigError, RecursionError):
         return ""
     name = str(given.get("preset", ""))
-    table, reading = lay_over(PRESETS.get(name, {}), given), Reading(Path(), Sources())
+    preset, reading = PRESETS.get(name, {}), Reading(Path(), Sources())
+    table = lay_over(preset, given)
     fluid = reading.made(Fluid, table.get("fluid", {}), "fluid")
     bodies = reading.made(BodiesConfig, table.get("bodies", {}), "bodies")
     words = f"Preset {name}" if name else "No preset"
-    if name and (own := [table for table in PHYSICS if given.get(table)]):
+    if name and (own := [each for each in PHYSICS if table.get(each) != preset.get(each)]):
         words += f" with values of its own for {' and '.join(own)}"
     if fluid is not None and bodies is not None:
-        words += f": {weight_of(bodies, fluid, results)}, {water_of(fluid)}"
+        known = weight_of(bodies, fluid), water_of(fluid), *surfaces_of(table.get("forces", {}))
+        words += f": {', '.join(known)}"
     return f"{words}."
 
 
-def weight_of(bodies: BodiesConfig, fluid: Fluid, results: Results) -> str:
+def weight_of(bodies: BodiesConfig, fluid: Fluid) -> str:
     """Return what the flocs weigh, in words."""
     sunk = "" if fluid.buoyancy else ", no buoyancy"
     if isinstance(bodies.density, FractalDensity):
         return f"real weight{sunk}"
     if bodies.surface_density is None:
         return f"{bodies.density:g} kg/m³{sunk}"
-    words = f"{bodies.surface_density:g} kg/m² of projected area"
-    radii = np.concatenate([np.ravel(each) for each in results.radii.values()])
-    radii = radii[radii > 0.0]  # NaN where they are not known
-    if len(radii):
-        # Spread over the mean depth of a sphere, a mass per area is a density.
-        times = bodies.surface_density / (4.0 / 3.0 * radii) / fluid.density
-        ends = dict.fromkeys(f"{float(f'{end:.2g}'):g}" for end in (times.min(), times.max()))
-        words += f", {' to '.join(ends)} times as dense as water"
-    return f"{words}{sunk}"
+    return f"{bodies.surface_density:g} kg/m² of projected area{sunk}"
 
 
 def water_of(fluid: Fluid) -> str:
     """Return the water, in words."""
-    warmth = f"{fluid.warmth - ZERO_CELSIUS:.3g} °C"
-    if fluid.salinity:
-        kind = "sea" if fluid.salinity >= SEA_WATER else "brackish"
-        return f"{kind} water of {warmth} and {fluid.salinity:g} g/kg"
-    if fluid.ionic_strength:
-        return f"water of {warmth} and {fluid.ionic_strength:g} mmol/l of salt"
-    if fluid.temperature is not None or fluid.salinity is not None:
-        return f"fresh water of {warmth}"
-    return f"water of {1e3 * fluid.viscosity:.3g} mPa s"
+    described = fluid.words.partition(":")[0]
+    return described or f"water of {1e3 * fluid.viscosity:.3g} mPa s"
+
+
+def surfaces_of(forces: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the potential and the Hamaker constant of the built-in forces that there are."""
+    for force, key, unit, scale, words in SURFACES:
+        with contextlib.suppress(ValueError, TypeError, KeyError):
+            yield words.format(scale * read_number(forces[force][key], unit))

@@ -114,7 +114,7 @@ class PairFiles(Contents):
 
     title = "results of a collision ensemble"
     on_examples = ON_EXAMPLES
-    first = ("outcomes", "delta", "kernels", "efficiency")
+    first = ("kernels", "efficiency", "outcomes", "delta", "8")
     file = schema.RESULTS
     compared = schema.COMPARED
     swept = ("probabilities", "pooled")
@@ -144,20 +144,18 @@ class PairFiles(Contents):
         return study_summary(facts, run, run_group.describe_note, SAID_APART, more)
 
     def table(self, results: schema.Results, numerics: bool = False, every: bool = False) -> str:
-        """Return the rates; or the efficiencies, if there are any, and the counts and
-        probabilities; and their errors.
+        """Return the rates; or the counts and probabilities; and their errors.
 
-        ``numerics``, ``every``: as of `report.format_table`; numerics also where they matter.
+        ``numerics``, ``every``: as of `report.format_table`; numerics also where they matter,
+        efficiencies only with every.
         """
         numerics = numerics or every or numerics_matter(results)
         if results.kernel is not None:
             lines = report.kernel_lines(results.kernel, numerics)
         else:
-            lines = [*report.efficiency_lines(results)]
-            lines += [""] * bool(lines)
-            lines.append(report.format_table(results, numerics, every))
+            lines = [report.format_table(results, numerics, every)]
+            lines += report.efficiency_lines(results) * every
         lines += [*report.touch_lines(results), report.numerics_line(results)]
-        lines += [report.third_line(results)] * every
         return "\n".join(filter(None, [*lines, report.outlines_line(results)]))
 
     detailed = table
