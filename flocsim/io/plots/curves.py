@@ -58,8 +58,7 @@ def against_key(results: SweepResults, numerics: bool = False) -> Figure:
         grid = figure.subplots(2, count, sharex=True, sharey="row", squeeze=False)
         step = set_key_axis(grid[0, 0], first, where[order].astype(float), count)
         step = min(WIDEST, step / len(words))
-        colours, marked = style.graded_colours(len(words)), set()
-        causes = outcomes.causes_of(columns, "pr_a")
+        colours = style.graded_colours(len(words))
         for number, title in enumerate(style.type_titles(types)):
             above, below = grid[:, number]
             above.set_title(title)
@@ -72,9 +71,6 @@ def against_key(results: SweepResults, numerics: bool = False) -> Figure:
                 outcomes.draw_ends(above, where[order], mine, 0.85 * step, shift)
                 line = outcomes.bands_in(mine, "pr_a", numerics)
                 outcomes.draw_bars(below, where[order], line, index, colours[index], shift=shift)
-                marked |= outcomes.mark_causes(
-                    below, where[order], causes[number, index], colours[index], shift
-                )
             outcomes.note_if_empty(below, columns["pr_a"][number], "no decided collision")
         grid[0, 0].set_ylabel("share of\nreplicates")
         grid[1, 0].set_ylabel(LABELS["pr_a"])
@@ -83,8 +79,7 @@ def against_key(results: SweepResults, numerics: bool = False) -> Figure:
             "replicates": outcomes.end_handles(columns), title: style.line_handles(words, colours)
         })  # fmt: skip
         side = "Above, bars from left: as the lines below. " * (len(words) > 1)
-        told = side + outcomes.bars_of(results, numerics) + outcomes.words_of(marked)
-        style.add_foot(figure, told)
+        style.add_foot(figure, side + outcomes.bars_of(results, numerics))
         return figure
 
 

@@ -1,6 +1,6 @@
 """How what becomes of replicates is drawn: probabilities as points with bars, ends as bars stacked
-to 1, and why a probability has no value; and what shapes do to them: Pr[A] and the classes against
-the shape measures of the flocs, and how much of the variance of Pr those explain.
+to 1; and what shapes do to them: Pr[A] and the classes against the shape measures of the flocs, and
+how much of the variance of Pr those explain.
 
 Counts are those of the group `probabilities` {name: (…)}, in whatever order of axes.
 """
@@ -14,7 +14,7 @@ import numpy as np
 from flocsim.io.confidence import bounded_sums, clustered_proportion, explained_share, proportion
 from flocsim.io.plots import style
 from flocsim.io.plots.style import Figure, drawing, plain
-from flocsim.io.results.events import NOT_COLLIDED, ends_of, events, events_of
+from flocsim.io.results.events import ends_of, events, events_of
 from flocsim.io.results.numerics import numerics_matter
 from flocsim.io.results.schema import SHAPE_MEASURES, Results
 
@@ -44,35 +44,6 @@ SHARES = {
 }
 """What is drawn as shares of a whole: its probabilities, its colours."""
 
-INSIDE, OUTSIDE = "all inside", "all outside"
-LETTERS = {
-    "missed": "m",
-    "held": "h",
-    "undecided": "u",
-    "failed": "f",
-    INSIDE: "i",
-    OUTSIDE: "o",
-}
-"""Marks of a probability without trials, by what became of most of its replicates."""
-
-MARK_AT = 0.025
-"""Where on the axis of probabilities these marks stand: above its line, where there is no value."""
-
-
-def causes_of(counts: Mapping[str, np.ndarray], name: str) -> np.ndarray:
-    """Why the probability ``name`` has no trials, a word of LETTERS; "" where it has some."""
-    trials = events_of(counts)[name].trials
-    ends = ends_of(counts)
-    causes = {word: ends[word] for word in NOT_COLLIDED}
-    classes = np.asarray(counts["n_class"])
-    if name == "pr_a_given_inside":
-        causes[OUTSIDE] = classes[..., 2:].sum(axis=-1)
-    elif name == "pr_a_given_outside":
-        causes[INSIDE] = classes[..., :2].sum(axis=-1)
-    words = np.array([*causes, ""], dtype=object)
-    most = np.argmax(np.stack(list(causes.values())), axis=0)
-    return words[np.where((trials == 0) & (np.asarray(counts["n_total"]) > 0), most, len(causes))]
-
 
 def draw_ends(
     axes: Any, places: np.ndarray, counts: Mapping[str, np.ndarray], width: float, shift: float = 0
@@ -85,24 +56,6 @@ def draw_ends(
         top = base + number / total
         axes.vlines(places, base, top, color=COLOURS[word], label=word, **look)
         base = top
-
-
-def mark_causes(
-    axes: Any, places: np.ndarray, causes: np.ndarray, colour: Any, shift: float = 0.0
-) -> set[str]:
-    """A letter on the axis at each place (k,) that has a cause; the causes that were marked."""
-    look = {"color": colour, "clip_on": False, "transform": shifted(axes, shift)}
-    look |= {"linestyle": "", "ms": 4.0, "markeredgewidth": 0.2}
-    for word in (found := {str(each) for each in causes if each}):
-        at = places[causes == word]
-        axes.plot(at, np.full(len(at), MARK_AT), marker=f"${LETTERS[word]}$", **look)
-    return found
-
-
-def words_of(marked: set[str]) -> str:
-    """What the letters of these causes say, for the foot; "" for none."""
-    told = [f"{LETTERS[word]}: {word}" for word in LETTERS if word in marked]
-    return f" No value: {', '.join(told)}." if told else ""
 
 
 def bars_of(results: Any, numerics: bool) -> str:
@@ -130,18 +83,15 @@ def end_handles(counts: Mapping[str, np.ndarray]) -> list[Any]:
 
 
 def draw_probability(axes, results, number, name, numerics, most=style.MOST_LABELS):
-    """The lines of a type, for each delta; the causes of what has no value."""
-    causes, marked = causes_of(results.probabilities, name)[number], set()
+    """Draw the lines of a type, one for each delta."""
     bands = [band[number] for band in bands_of(results, name, numerics)]
     style.set_vertex_axis(axes, results.vertices, most)
     style.set_probability_axis(axes)
     count, few = results.delta.size, trials_of(results, name)[number] < FEW
     for index, colour in enumerate(style.graded_colours(count)[:count]):
         line = [band[:, index] for band in bands]
-        marked |= draw_line(axes, results.vertices, line, index, count, colour, few[:, index],
-                            causes[:, index])  # fmt: skip
+        draw_line(axes, results.vertices, line, index, count, colour, few[:, index])
     note_if_empty(axes, bands[0], NO_EVENTS[name])
-    return marked
 
 
 def trials_of(results, name):
@@ -219,17 +169,16 @@ def shares_of(results, number, name):
     return clustered_proportion(bounded_sums(successes, trials, unknown))[:3]
 
 
-def draw_line(axes, vertices, bands, index, count, colour, few=None, causes=None):
-    """Line ``index`` of ``count``: points with bars, joined in the order of N; the causes marked.
+def draw_line(axes, vertices, bands, index, count, colour, few=None):
+    """Draw line ``index`` of ``count``: points with bars, joined in the order of N.
 
     Inner bars are intervals, outer ones, thin, these and the numerical error on either side;
-    points are hollow where there are ``few`` trials, ``causes`` say why there are none.
+    points are hollow where there are ``few`` trials, and missing where there are none.
     """
     order = np.argsort(vertices)
     places = style.vertex_positions(vertices)[order] + style.dodge(index, count)
     few = None if few is None else few[order]
     draw_bars(axes, places, [np.asarray(band)[order] for band in bands], index, colour, few)
-    return set() if causes is None else mark_causes(axes, places, causes[order], colour)
 
 
 def draw_bars(axes, places, bands, index, colour, few=None, shift=0.0):

@@ -19,7 +19,7 @@ from flocsim.io.results.schema import Results
 
 NARROW = 4
 """Labels of vertex counts that fit a panel of three beside each other."""
-HOLLOW = f" Hollow: fewer than {ends.FEW}."
+HOLLOW = f" Hollow: of fewer than {ends.FEW} pairs; missing: of none."
 DELTA_LABEL = r"displacement $\delta\,/\,\delta_{\max}$"
 LABELS = {
     "pr_inside": r"$\Pr[C(d_c<D_0)]$",
@@ -50,13 +50,13 @@ def figure_6(results: Results, numerics: bool = False) -> Figure:
 
 def probability_figure(results, name, numerics):
     """One panel per type, one line per delta, against N."""
-    numerics, marked = numerics or numerics_matter(results), set()
+    numerics = numerics or numerics_matter(results)
     titles = style.type_titles(results.types)
     with style.panel_grid(titles, LABELS[name]) as (figure, panels, spare):
         for number, axes in enumerate(panels):
-            marked |= ends.draw_probability(axes, results, number, name, numerics)
+            ends.draw_probability(axes, results, number, name, numerics)
         style.place_legend(figure, delta_legend(results), spare)
-        style.add_foot(figure, ends.bars_of(results, numerics) + HOLLOW + ends.words_of(marked))
+        style.add_foot(figure, ends.bars_of(results, numerics) + HOLLOW)
         return figure
 
 
@@ -78,13 +78,13 @@ def figure_8(results: Results, numerics: bool = False) -> Figure:
 def overview(results: Results, numerics: bool = False) -> Figure:
     """Pr[C inside], Pr[A], the classes and the bonds in one picture, a column for each type."""
     rows = ("pr_inside", "pr_a", *ends.SHARES)
-    numerics, marked = numerics or numerics_matter(results), set()
+    numerics = numerics or numerics_matter(results)
     count, titles = len(results.types), style.type_titles(results.types)
     with drawing(max(WIDTH, 1.0 * count + 0.4), 4.4) as figure:
         grid = figure.subplots(len(rows), count, sharex=True, sharey=True, squeeze=False)
         for number in range(count):
             for axes, name in zip(grid[:2, number], rows[:2], strict=True):
-                marked |= ends.draw_probability(axes, results, number, name, numerics, NARROW)
+                ends.draw_probability(axes, results, number, name, numerics, NARROW)
             for axes, name in zip(grid[2:, number], ends.SHARES, strict=True):
                 ends.draw_shares(axes, results, number, name, numerics, NARROW)
             grid[0, number].set_title(titles[number])
@@ -93,19 +93,18 @@ def overview(results: Results, numerics: bool = False) -> Figure:
             axes.set_ylabel(LABELS[name])
         legends = [delta_legend(results), *map(shares_legend, ends.SHARES)]
         style.place_legend(figure, {k: each for one in legends for k, each in one.items()})
-        style.add_foot(figure, ends.bars_of(results, numerics) + HOLLOW + ends.words_of(marked))
+        style.add_foot(figure, ends.bars_of(results, numerics) + HOLLOW)
         return figure
 
 
 def against_delta(results: Results, numerics: bool = False) -> Figure:
     """Pr[A] against delta: a panel for each type, a line for each number of vertices."""
-    numerics, marked = numerics or numerics_matter(results), set()
+    numerics = numerics or numerics_matter(results)
     titles = style.type_titles(results.types)
     with style.panel_grid(titles, LABELS["pr_a"], DELTA_LABEL) as (figure, panels, spare):
         colours = style.graded_colours(len(results.vertices))
         order = np.argsort(results.delta)
         places = results.delta[order]
-        causes = ends.causes_of(results.probabilities, "pr_a")
         found = ends.bands_of(results, "pr_a", numerics)
         for number, axes in enumerate(panels):
             style.set_probability_axis(axes)
@@ -117,14 +116,12 @@ def against_delta(results: Results, numerics: bool = False) -> Figure:
                 shift = POINTS * style.dodge(index, len(results.vertices))
                 few = ends.trials_of(results, "pr_a")[number, index][order] < ends.FEW
                 ends.draw_bars(axes, places, bands, index, colour, few, shift)
-                why = causes[number, index][order]
-                marked |= ends.mark_causes(axes, places, why, colour, shift)
             known = results.probabilities["pr_a"][number]
             ends.note_if_empty(axes, known, ends.NO_EVENTS["pr_a"])
         words = ["sphere" if count == 1 else str(count) for count in results.vertices]
         legend = {"vertices $N$": style.line_handles(words, colours)}
         style.place_legend(figure, legend, spare)
-        style.add_foot(figure, ends.bars_of(results, numerics) + HOLLOW + ends.words_of(marked))
+        style.add_foot(figure, ends.bars_of(results, numerics) + HOLLOW)
         return figure
 
 

@@ -1,4 +1,4 @@
-"""Bars of outcomes, marks of empty denominators, and the axis of a sweep."""
+"""Bars of outcomes, and the axis of a sweep."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ import pytest
 
 from flocsim.io.labelled import Column
 from flocsim.io.plots.curves import against_key
-from flocsim.io.plots.outcomes import COLOURS, INSIDE, MARK_AT, causes_of
+from flocsim.io.plots.outcomes import COLOURS
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import save
 from flocsim.io.results.events import ends_of
@@ -44,12 +44,6 @@ def stacks(axes, number):
             for each in axes.collections[: len(COLOURS)]]  # fmt: skip
 
 
-def letters(axes):
-    """[(places, letter)] of the marks of what has no value."""
-    return [(line.get_xdata().tolist(), str(line.get_marker()).strip("$")) for line in axes.lines
-            if len(line.get_ydata()) and np.all(line.get_ydata() == MARK_AT)]  # fmt: skip
-
-
 def test_bars_are_shares_of_all_replicates_and_add_up_to_1():
     results = make_results()
     figure = FIGURES["outcomes"](results)
@@ -80,21 +74,6 @@ def test_every_value_is_on_the_axis_whatever_has_no_value(values, scale, tmp_pat
         assert all(low < value < high for value in values)
         np.testing.assert_allclose(axes.get_xticks(), values)
     for below in figure.axes[2:]:
-        marks = letters(below)
-        # One for each line: N and delta.
-        assert len(marks) == 10 and all(mark == ([values[-1]], "h") for mark in marks)
         # Points stand at their values, and beside them by points of the page alone.
         for container in (c for c in below.containers if c.lines[0] is not None):
             np.testing.assert_allclose(container.lines[0].get_xdata(), values)
-    note = figure._supxlabel.get_text().replace("\n", " ")
-    assert "No value: h: held." in note
-
-
-def test_an_empty_denominator_has_its_cause():
-    # held | undecided, mostly | missed | inside, all of them | decided outside
-    outcome = [[HELD, HELD, 4], [5, 5, 4], [4, 4, 4], [0, 1, 0], [2, 3, 4]]
-    inside = [[255, 255, 255], [255, 1, 255], [255, 255, 255], [1, 1, 1], [0, 0, 255]]
-    bond = np.where(np.isin(outcome, [0, 2]), 1, NOT_APPLICABLE)
-    table = tabulate(outcome, inside, bond)
-    assert causes_of(table, "pr_a").tolist() == ["held", "undecided", "missed", "", ""]
-    assert causes_of(table, "pr_a_given_outside").tolist()[3:] == [INSIDE, ""]
