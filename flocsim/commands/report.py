@@ -31,8 +31,8 @@ from flocsim.io.plots.style import METADATA, MICRO, add_foot, house_style
 
 TEMPLATES = Path(__file__).with_name("templates")
 
-MOST_SHOWN = 3
-"""Figures that are not folded."""
+MOST_FIGURES = 3
+"""Of each file; `flocsim plot` draws all."""
 
 MOST_OUTLINES = 12
 
@@ -158,13 +158,11 @@ def answer_of(part: Part) -> str:
 
 
 def figures_of(part: Part) -> str:
-    """Return the most telling figures, and the others folded."""
-    figures = part.kind.figures(part.found)
+    """Return the most telling figures."""
+    figures, foot = part.kind.figures(part.found), part.kind.source(part.found)
     names = [name for name in dict.fromkeys([*part.kind.first, *figures]) if name in figures]
-    foot = part.kind.source(part.found)
-    drawn = [figure_of(name, figures[name], part.found, foot) for name in names]
-    more = "\n".join(drawn[MOST_SHOWN:])
-    return "\n".join([*drawn[:MOST_SHOWN], folded("More figures", more)])
+    drawn = (figure_of(name, figures[name], part.found, foot) for name in names[:MOST_FIGURES])
+    return "\n".join(drawn)
 
 
 def figure_of(name: str, draw: Any, results: Any, foot: str) -> str:
