@@ -8,7 +8,6 @@ from pathlib import Path
 from flocsim.commands import add_overwrite
 from flocsim.commands.fit_pictures import (
     draw_fits,
-    draw_overlays,
     draw_review,
     files_of,
     fit_pictures,
@@ -24,8 +23,7 @@ from flocsim.io.fit_report import format_errors, population_lines, summary_text
 from flocsim.io.images.paper import CUTOFF
 from flocsim.io.images.pictures import label_image
 from flocsim.io.images.stacks import LARGEST_PIXEL, SMALLEST_PIXEL
-from flocsim.io.outputs import check_ending, check_outputs
-from flocsim.io.plots.style import FIGURE_ENDINGS
+from flocsim.io.outputs import check_outputs
 from flocsim.io.shape_library import make_entry, write_library
 from flocsim.plausibility import PIXEL_SIZE
 
@@ -65,9 +63,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     --masks: treat the files as masks or labels (PNG, TIFF, .npy, .npz), not pictures
     --jobs K: number of processes (default: %(default)s)
     --output FILE: shape library to write (default: %(default)s)
-    --overlay FILE: draw the outlines at the largest N over the picture (.png, .pdf, .svg), with
-        rejected regions dashed and the reason; of several pictures, one file each:
-        FILE-picture.png
     --fits FOLDER: draw every fit at the largest N: mask, core, the outline swept by the disk, and
         the pixels that differ
     --masks-out FOLDER: write a label image of every picture, 0 outside and the number of each floc
@@ -113,7 +108,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         add(flag, action="store_true")
     add("--jobs", type=whole, default=1)
     add("-o", "--output", default="shapes.h5")
-    for name in ("--overlay", "--fits", "--masks-out"):
+    for name in ("--fits", "--masks-out"):
         add(name)
     add("--review", action="store_true")
     add("--reviewed")
@@ -187,17 +182,15 @@ def run(args: argparse.Namespace) -> int:
     options = {name: getattr(args, name) for name in (OF_MASKS if args.masks else own)}
     # What is not given is as `segment`, or `segment_as_paper`, has it by default.
     args.segmentation = {name: each for name, each in options.items() if each is not None}
-    if args.overlay is not None:
-        check_ending(args.overlay, FIGURE_ENDINGS)
     paths = list_pictures(args.images, args.masks)
     for option in ("fits", "masks_out"):
         if (folder := getattr(args, option)) is not None:
             make_folder(folder, f"--{option.replace('_', '-')} ")
-    table, rule, titles = Path(args.output).with_suffix(".csv"), args.overwrite, titles_of(paths)
-    overlays, labels = drawn_files(args, titles, len(paths) > 1)
+    table, rule = Path(args.output).with_suffix(".csv"), args.overwrite
+    labels = label_files(args.masks_out, titles_of(paths))
     pages = [table.with_name(f"{table.stem}-review.html")] if args.review else []
     inputs = paths if args.reviewed is None else [*paths, args.reviewed]
-    check_outputs([args.output, table, *pages, *overlays, *labels], rule, inputs)
+    check_outputs([args.output, table, *pages, *labels], rule, inputs)
 
     pictures, lost = fit_pictures(paths, args)
     entries = [
@@ -229,13 +222,11 @@ def run(args: argparse.Namespace) -> int:
     flocs = plural(len(entries) // len(args.radii), "floc")
     print(f"{args.output}: {flocs} at N = {counts}; {table}: all regions")
 
-    names = [each.name for each in pictures]
-    overlays, labels = drawn_files(args, names, max(len(paths), len(names)) > 1)
+    # A file may hold several pictures, which have names of their own.
+    labels = label_files(args.masks_out, [each.name for each in pictures])
     for picture, path in zip(pictures, labels, strict=False):
         found = picture.found
         write_file(path, label_image(found.foreground.shape, found.regions, picture.name), rule)
-    if args.overlay is not None:
-        draw_overlays(overlays, pictures, args)
     if args.fits is not None:
         draw_fits(args.fits, pictures, rule)
     draw_review(pages, pictures, args)
@@ -244,17 +235,6 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def drawn_files(
-    args: argparse.Namespace, names: Sequence[str], apart: bool
-) -> tuple[list[Path], list[Path]]:
-    """Return the overlays and the label images of pictures with these names, as far as they are
-    asked for; ``apart``: each overlay has the name of its picture in its own."""
-    overlays, labels = [], []
-    if args.overlay is not None:
-        path = Path(args.overlay)
-        overlays = [path] * len(names)
-        if apart:
-            overlays = files_of(names, f"{path.with_suffix('')}-", path.suffix)
-    if args.masks_out is not None:
-        labels = files_of(names, os.path.join(args.masks_out, ""), ".png")
-    return overlays, labels
+def label_files(folder: str | None, names: Sequence[str]) -> list[Path]:
+    """Return the label images in a folder of pictures with these names; none without a folder."""
+    return [] if folder is None else files_of(names, os.path.join(folder, ""), ".png")

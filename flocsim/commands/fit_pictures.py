@@ -16,7 +16,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.errors import FileError, FlocsimError, ImageError, ShapeError, UsageError, plural
+from flocsim.errors import FileError, FlocsimError, ImageError, ShapeError, UsageError
 from flocsim.geometry.fit.fit import Fit, fit_mask
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.files import Rule, write_file
@@ -38,7 +38,7 @@ from flocsim.io.images.review import (
 )
 from flocsim.io.images.stacks import Plane, pixel_size_in, planes_of, stack_of
 from flocsim.io.plots.review import review_page
-from flocsim.io.plots.shapes import draw_overlay, single_fit
+from flocsim.io.plots.shapes import single_fit
 from flocsim.io.plots.style import save
 from flocsim.io.terminal import Progress
 from flocsim.tasks import Lost, workers
@@ -297,16 +297,6 @@ def draw_fits(folder: str, pictures: Sequence[Picture], rule: Rule) -> None:
             name = f"{picture.name}#{region.label}"
             figure = single_fit(region.mask, picture.finest(region), name)
             save(figure, Path(f"{start}-{region.label}.png"), rule)
-
-
-def draw_overlays(paths: Sequence[Path], pictures: Sequence[Picture], options: Namespace) -> None:
-    """Write each picture with the outlines at the largest N and the smallest spheroradius."""
-    for picture, path in zip(pictures, paths, strict=True):
-        flocs = [(region, picture.finest(region)) for region in picture.found.regions]
-        title = (f"{picture.name}: {plural(len(flocs), 'floc')}, N = {options.vertices[-1]}, "
-                 f"r = {options.radii[0]:g} px")  # fmt: skip
-        figure = draw_overlay(grey_in(picture, options), flocs, title, picture.found.rejected)
-        save(figure, path, options.overwrite)
 
 
 def draw_review(paths: Sequence[Path], pictures: Sequence[Picture], options: Namespace) -> None:

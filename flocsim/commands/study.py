@@ -37,8 +37,8 @@ from flocsim.process import INTERRUPTED, SIGNALS, STOPPED, WITHHELD, deferred, h
 KINDS = {"clay": "clay", "tang2014": "paper", "si": "measured"}
 """Presets, and the kind of `flocsim init` with each."""
 
-FIGURES = ("overview", "outcomes")
-"""Figures that are drawn as files; the report has them all."""
+FIGURE = "outcomes"
+"""The figure that is drawn as a file, too; the report has more."""
 
 REPORT = "report.html"
 RECORD = "study.json"
@@ -102,24 +102,22 @@ class StudyFolder:
         path = self.path / name
         return path.exists() and self.record["made"].get(name) in ("", sha256_of(path))
 
-    def make(self, names: Sequence[str], *words: str, of: Sequence[Path] = ()) -> None:
-        """Run a command that writes these files, in the place of those that are its own.
+    def make(self, name: str, *words: str, of: Sequence[Path] = ()) -> None:
+        """Run a command that writes this file, in the place of the study's own one of that name.
 
-        ``of``: the results that they show; files that are there and show them are left as they are.
+        ``of``: the results that it shows; a file that is there and shows them is left as it is.
         """
         made, shown = self.record["made"], [*map(sha256_of, of), __version__]
-        there = all((self.path / name).exists() for name in names)
-        if of and there and self.record["shown"].get(names[0]) == shown:
+        path = self.path / name
+        if of and path.exists() and self.record["shown"].get(name) == shown:
             return
-        for name in names:
-            if self.is_own(name):
-                (self.path / name).unlink()
-            if not (self.path / name).exists():
-                made[name] = ""
+        if self.is_own(name):
+            path.unlink()
+        if not path.exists():
+            made[name] = ""
         self.save()
         call(*words)
-        made |= {name: sha256_of(self.path / name) for name in names}
-        self.record["shown"][names[0]] = shown
+        made[name], self.record["shown"][name] = sha256_of(path), shown
         self.save()
 
 
@@ -176,12 +174,13 @@ def make_study(args: Namespace) -> int:
         results = [folder.path / f"{preset}.h5" for preset in presets]
         page = typed(folder.path / REPORT)
         words = ["report", *map(typed, results), "-o", page, *["--overwrite"] * args.overwrite]
-        folder.make([REPORT], *words, of=results)
+        folder.make(REPORT, *words, of=results)
         for path in results:
             kind, file = open_kind(path)
             found = kind.read(file)
             print("", kind.setting(found), kind.answer(found), sep="\n")
-        print(f"\n{page}")
+        review = folder.path / "shapes-review.html"
+        print(f"\nall on one page: {page}\ncheck the outlines, and leave out flocs, on {review}")
     return code
 
 
@@ -220,7 +219,7 @@ def fit_shapes(args: Namespace, pictures: Sequence[Path], folder: StudyFolder) -
     source = {
         "pictures": sorted([path.name, sha256_of(path)] for path in pictures),
         "pixel_size": args.pixel_size,
-        "options": args.fit,
+        "options": [[word, sha256_of(word) if os.path.isfile(word) else ""] for word in args.fit],
     }
     shapes, before = folder.path / "shapes.h5", folder.record["source"]
     if shapes.exists() and before == source:
@@ -237,7 +236,7 @@ def fit_shapes(args: Namespace, pictures: Sequence[Path], folder: StudyFolder) -
     words = ["fit", *map(typed, args.images), *args.fit]
     words += ["--pixel-size", repr(args.pixel_size)] * (args.pixel_size is not None)
     words += ["--vertices", "4,16,64", "--radius", "1", "--jobs", str(args.jobs)]
-    words += ["-o", typed(shapes), "--overlay", typed(folder.path / "outlines.png")]
+    words += ["-o", typed(shapes), "--review"]
     call(*words, *["--overwrite"] * shapes.exists())
     folder.record["source"] = source
     folder.save()
@@ -253,14 +252,13 @@ def run_preset(args: Namespace, preset: str, folder: StudyFolder) -> int:
     rule = ["--overwrite"] * args.overwrite
     if not Path(config).exists():
         words = ["init", config, "--kind", KINDS[preset], "--shapes", shapes]
-        folder.make([f"{preset}.toml"], *words)
+        folder.make(f"{preset}.toml", *words)
     elif not folder.is_own(f"{preset}.toml"):
         print(f"\n{config} has been edited, and is used as it is")
     words = ["ensemble", config, "-o", results, "--resume", *rule]
     words += ["--jobs", str(args.jobs)] * (args.jobs > 1)
     words += ["--replicates", str(args.replicates)] * (args.replicates is not None)
     code = call(*words, *(word for each in args.settings for word in ("--set", each)))
-    drawn = [f"figures/{preset}-{name}.png" for name in FIGURES]
-    words = ["plot", results, "--output-dir", figures, "--figures", ",".join(FIGURES), *rule]
-    folder.make(drawn, *words, of=[Path(results)])
+    words = ["plot", results, "--output-dir", figures, "--figures", FIGURE, *rule]
+    folder.make(f"figures/{preset}-{FIGURE}.png", *words, of=[Path(results)])
     return code

@@ -50,7 +50,7 @@ def picture_line(name: str, found: Segmentation) -> str:
     about = f"foreground {100 * found.foreground_share:.2f} %"
     if found.threshold == found.threshold:
         about += f", threshold {found.threshold:.4g}"
-    alarms = "".join(f"; CHECK THE OVERLAY: {alarm}" for alarm in found.alarms)
+    alarms = "".join(f"; CHECK THE OUTLINES: {alarm}" for alarm in found.alarms)
     return f"{name}: {'; '.join(parts)}; {about}{alarms}"
 
 

@@ -127,10 +127,10 @@ def test_names_that_are_no_text_are_written_with_their_bytes(folder, capsys, job
         os.rename(folder / "frames/b.png", strange)
     except OSError:
         pytest.skip("this file system takes text only")
-    assert fit(jobs, "--overlay", "over.png") == 0
+    assert fit(jobs, "--masks-out", "masks") == 0
     assert ids() == ["a.png#1", "c.png#1", r"caf\xe9.png#1"]
     assert r"caf\xe9.png" in (folder / "s.csv").read_text("utf-8")
-    assert (folder / r"over-caf\xe9.png").exists()
+    assert (folder / r"masks/caf\xe9.png").exists()
 
 
 def doubled(number):

@@ -126,18 +126,10 @@ def test_a_trajectory_has_the_name_of_its_config(folder, capsys):
 
 
 @pytest.mark.parametrize("more", [[], ["--overwrite"]])
-@pytest.mark.parametrize("option", ["-o", "--overlay"])
+@pytest.mark.parametrize("option", [["-o", "frame.png"], ["--masks-out", "."]])
 def test_a_picture_is_never_replaced_by_what_is_fitted_to_it(folder, capsys, option, more):
-    words = ["fit", "frame.png", "photo.png", *PIXEL, option, "frame.png", *more]
-    if option == "--overlay":  # one file for each picture: frame-frame.png, frame-photo.png
-        words.remove("photo.png")
+    words = ["fit", "frame.png", "photo.png", *PIXEL, *option, *more]
     assert "frame.png would replace frame.png, which is an input" in refused(folder, capsys, *words)
-
-
-def test_overlays_of_several_pictures_spare_what_is_there(folder, capsys):
-    (folder / "over-photo.png").write_bytes((folder / "photo.png").read_bytes())
-    words = ["fit", "frame.png", "photo.png", *PIXEL, "--overlay", "over.png"]
-    assert "over-photo.png already exists" in refused(folder, capsys, *words)
 
 
 def test_the_table_never_takes_the_place_of_the_library(folder, capsys):
@@ -184,7 +176,6 @@ def test_what_is_no_file_is_told_by_every_command(folder, capsys):
         ["ensemble", "small.toml", "-o", "pipe.png"],
         ["trajectory", "small.toml", *ONE, "-o", "pipe.png"],
         ["fit", "frame.png", *PIXEL, "-o", "pipe.png"],
-        ["fit", "frame.png", *PIXEL, "--overlay", "pipe.png"],
         ["init", "pipe.png"],
         ["plot", "study.h5", "--figures", "overview"],
         ["ensemble", "small.toml", "-o", os.devnull],

@@ -15,12 +15,17 @@ from flocsim.io.fit_report import MOST_ERROR
 from flocsim.io.images.pictures import UNDECIDED
 from flocsim.io.images.regions import Region
 from flocsim.io.images.review import KEEP, jpeg_of, outline_of
-from flocsim.io.plots.shapes import stretched
 
 LONGEST_SIDE, SHORTEST_SIDE = 2000, 500
 """Longer side of a picture on the page [px] if there are few, and the least if there are many."""
 
 FEW = 40
+
+CLIPPED = 0.5
+"""Percent of the pixels that may become black, and white."""
+
+DARK_SHARE, DARK_GREY, LEAST_GAMMA = 20, 0.35, 0.4
+"""So many percent of the pixels lie below this grey, unless the picture is as dark as it can."""
 
 
 def review_page(template: str, pictures: Sequence[Any], greys: Iterable[np.ndarray]) -> str:
@@ -38,6 +43,21 @@ def review_page(template: str, pictures: Sequence[Any], greys: Iterable[np.ndarr
     choices = json.dumps({"pictures": [each.choices for each in pictures]}).replace("<", "\\u003c")
     parts = {"PICTURES": "\n".join(sections), "CHOICES": choices}
     return re.sub("@(PICTURES|CHOICES)@", lambda found: parts[found[1]], template)
+
+
+def stretched(grey: np.ndarray) -> np.ndarray:
+    """Grey from black to white, the dark brightened: what a dim or vignetted picture shows.
+
+    (grey − low)/(high − low) to the power γ ≤ 1; low and high leave out half a percent of the
+    pixels each, and γ brings the 20th percentile to .35, if 0.4 or more does.
+    """
+    values = np.asarray(grey, float)
+    low, high = np.percentile(values, [CLIPPED, 100.0 - CLIPPED])
+    if high <= low:
+        low, high = values.min(), max(values.max(), values.min() + 1e-9)
+    spread = np.clip((values - low) / (high - low), 0.0, 1.0)
+    dark = np.clip(np.percentile(spread, DARK_SHARE), 1e-6, 1.0 - 1e-6)
+    return spread ** np.clip(np.log(DARK_GREY) / np.log(dark), LEAST_GAMMA, 1.0)
 
 
 def section_of(place: int, picture: Any, jpeg: bytes) -> str:

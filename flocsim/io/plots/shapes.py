@@ -1,11 +1,11 @@
-"""Figures of fitted flocs: sizes (Fig. 2), errors (Fig. 3) and shapes of a library; a picture with
-the outlines of its flocs, and of every region left out, with the reason; a single fit (Fig. 1).
+"""Figures of fitted flocs: sizes (Fig. 2), errors (Fig. 3) and shapes of a library; a single fit
+(Fig. 1).
 
 A figure of a shape library is a function of its entries that stands in POPULATION_FIGURES, under
 the name that `flocsim plot` gives it; the first line of its docstring is the command's help.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +18,6 @@ from flocsim.io.fit_report import (
     one_each,
     perimeter_dimension,
 )
-from flocsim.io.images.regions import Region
 from flocsim.io.plots import style
 from flocsim.io.plots.style import Figure, drawing, plain
 from flocsim.io.shape_library import ShapeEntry
@@ -174,149 +173,6 @@ POPULATION_FIGURES: dict[str, Callable[[Sequence[ShapeEntry]], Figure]] = {
     "sizes": sizes,
     "shape": shape,
 }
-
-
-FLOC_COLOUR = "#ff7f0e"
-REASON_COLOURS = {
-    "out of focus": "#56b4e9", "at the border": "#f0e442", "too small": "#cc79a7",
-    "too large": "#00b894", "rejected by eye": "#e84393",
-}  # fmt: skip
-OTHER_COLOUR = "#ffffff"
-DASHES = (0, (3, 1.5))
-MOST_WORDS = 12
-"""Regions of more than that for one reason get a number only: words would cover the picture."""
-
-LONGEST_SIDE = 12.0
-"""Longer side of the drawing [inch]."""
-
-STRIP = 0.5
-"""Height of the title and the key above the picture [inch]."""
-
-CLIPPED = 0.5
-"""Percent of the pixels that may become black, and white."""
-
-DARK_SHARE, DARK_GREY, LEAST_GAMMA = 20, 0.35, 0.4
-"""So many percent of the pixels lie below this grey, unless the picture is as dark as it can."""
-
-LETTER = 0.62
-"""Width of a letter, as a share of its height."""
-
-
-def draw_overlay(
-    grey: np.ndarray,
-    flocs: "Iterable[tuple[Region, Fit]]",
-    title: str,
-    rejected: Iterable[Region] = (),
-) -> Figure:
-    """A figure of the picture with the outline of every floc, and dashed those of the others.
-
-    grey: (h, w) in [0, 1], drawn stretched (`stretched`); title: one line.  Numbers are those of
-    the table; a colour stands for each reason, and the key says which.  Returns the figure, for
-    flocsim.io.plots.style.save.
-    """
-    # The picture fills the figure, but for a strip for the title.
-    height, width = (size * LONGEST_SIDE / max(grey.shape) for size in grey.shape)
-    flocs, rejected = list(flocs), list(rejected)
-    with drawing(max(width, 4.0), max(height, 2.0) + STRIP) as figure:
-        from matplotlib.lines import Line2D
-
-        figure.set_layout_engine("none")
-        top = 1.0 - STRIP / figure.get_figheight()
-        axes = figure.add_axes((0.0, 0.0, 1.0, top))
-        axes.imshow(stretched(grey), cmap="gray", interpolation="nearest", vmin=0.0, vmax=1.0)
-        axes.set_axis_off()
-        figure.text(0.004, 1.0 - 0.05 / figure.get_figheight(),
-                    plain(title, style.MOST_OF_TITLE), va="top", fontsize=9)  # fmt: skip
-        labels = Labels(axes, grey.shape, max(grey.shape) / LONGEST_SIDE)
-        key = [Line2D([], [], color=FLOC_COLOUR, label=f"{len(flocs)} fitted")]
-        for region, fit in flocs:
-            first_row, first_column = region.bbox[:2]
-            # The mask has a margin of one pixel, and the fit's y counts upwards.
-            for ring in swept_rings(fit.parts):
-                axes.plot(*(ring * (1.0, -1.0) + (first_column - 1, first_row - 1)).T,
-                          color=FLOC_COLOUR, linewidth=0.8)  # fmt: skip
-            sure = "" if region.parted != region.parted else f" separated, {region.parted:.2f}"
-            labels.put(f"{region.label}{sure}", region.bbox, FLOC_COLOUR, 7)
-            for mask in region.band or ():
-                draw_mask(axes, mask, region.bbox, FLOC_COLOUR, linewidths=0.3)
-        reasons = [each.reason for each in rejected]
-        for reason in dict.fromkeys(sorted(reasons)):
-            colour = REASON_COLOURS.get(reason, OTHER_COLOUR)
-            text = f"{reasons.count(reason)} {reason}"
-            key.append(Line2D([], [], color=colour, linestyle=DASHES, label=text))
-            for each in (each for each in rejected if each.reason == reason):
-                dashed = {"linewidths": 0.7, "linestyles": [DASHES]}
-                draw_mask(axes, each.mask, each.bbox, colour, **dashed)
-                wordless = reasons.count(reason) > MOST_WORDS
-                text = str(each.label) if wordless else f"{each.label} {reason}"
-                labels.put(text, each.bbox, colour, 5.5 if wordless else 6.5)
-        figure.legend(
-            handles=key, loc="upper left", borderaxespad=0.3,
-            bbox_to_anchor=(0.0, 1.0 - 0.23 / figure.get_figheight()),
-            ncols=len(key), facecolor="0.3", edgecolor="none", frameon=True, labelcolor="white",
-            fontsize=6, borderpad=0.3, columnspacing=1.2, handlelength=2.5,
-        )  # fmt: skip
-    return figure
-
-
-def stretched(grey: np.ndarray) -> np.ndarray:
-    """Grey from black to white, the dark brightened: what a dim or vignetted picture shows.
-
-    (grey − low)/(high − low) to the power γ ≤ 1; low and high leave out half a percent of the
-    pixels each, and γ brings the 20th percentile to .35, if 0.4 or more does.
-    """
-    values = np.asarray(grey, float)
-    low, high = np.percentile(values, [CLIPPED, 100.0 - CLIPPED])
-    if high <= low:
-        low, high = values.min(), max(values.max(), values.min() + 1e-9)
-    spread = np.clip((values - low) / (high - low), 0.0, 1.0)
-    dark = np.clip(np.percentile(spread, DARK_SHARE), 1e-6, 1.0 - 1e-6)
-    return spread ** np.clip(np.log(DARK_GREY) / np.log(dark), LEAST_GAMMA, 1.0)
-
-
-def draw_mask(axes, mask, bbox, colour, **look):
-    """The outline of a mask around a bbox, with the same margin on every side."""
-    top, left, bottom, right = bbox
-    margin = (mask.shape[0] - (bottom - top)) // 2
-    columns = np.arange(left - margin, right + margin)
-    rows = np.arange(top - margin, bottom + margin)
-    axes.contour(columns, rows, mask.astype(float), levels=[0.5], colors=[colour], **look)
-
-
-class Labels:
-    """Texts beside regions: inside the frame, and on no other where a free corner is left."""
-
-    def __init__(self, axes, shape, pixels_per_inch):
-        self.axes, self.shape, self.scale = axes, shape, pixels_per_inch / 72.0
-        self.taken: list[tuple[float, float, float, float]] = []
-
-    def put(self, text, bbox, colour, size):
-        """Write a text at a corner of a box (top, left, bottom, right) [px]."""
-        from matplotlib.patheffects import withStroke
-
-        height = size * self.scale
-        width = LETTER * height * len(text)
-        top, left, bottom, right = bbox
-        corners = [(right, top - height), (right, bottom), (left - width, top - height),
-                   (left - width, bottom), (left, top - height), (left, bottom)]  # fmt: skip
-        boxes = [self.inside(x, y, width, height) for x, y in corners]
-        box = next(filter(self.is_free, boxes), boxes[0])
-        self.taken.append(box)
-        around = [withStroke(linewidth=0.9, foreground="black")]
-        look = {"va": "top", "ha": "left", "path_effects": around}
-        self.axes.text(box[0], box[1], text, color=colour, fontsize=size, **look)
-
-    def inside(self, x, y, width, height):
-        x = min(max(x, 0.0), max(self.shape[1] - 1.0 - width, 0.0))
-        y = min(max(y, 0.0), max(self.shape[0] - 1.0 - 1.3 * height, 0.0))
-        return x, y, x + width, y + height
-
-    def is_free(self, box):
-        left, top, right, bottom = box
-        return not any(
-            left < other[2] and other[0] < right and top < other[3] and other[1] < bottom
-            for other in self.taken
-        )
 
 
 MASK, CORE, DISK = "#c7c7c7", "#0072B2", "#D55E00"
