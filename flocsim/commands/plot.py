@@ -11,7 +11,7 @@ from flocsim.ensembles.contents import Contents, open_kind, studies
 from flocsim.errors import UsageError
 from flocsim.io.files import make_folder
 from flocsim.io.journal import journal_of
-from flocsim.io.outputs import check_ending, check_outputs
+from flocsim.io.outputs import check_outputs
 from flocsim.io.plots.style import FORMATS, mark_figure, save
 
 
@@ -43,23 +43,28 @@ def run(args: argparse.Namespace) -> int:
     """Draw the figures asked for, print the path of each; returns the exit code."""
     kind, content, remark, foot = read_content(args.results)
     figures = kind.figures(content)
-    names = [name for name in kind.drawn if name in figures] or list(figures)
-    if args.figures is not None and args.figures != "all":
+    names = [name for name in kind.drawn if name in figures]
+    if args.figures is not None:
         names = list(dict.fromkeys(map(str.strip, args.figures.split(","))))
-    elif args.figures == "all":
+    if not names or names == ["all"]:
         names = list(figures)
-    foreign = [name for name in names if name not in figures]
-    if foreign:
+    if foreign := [name for name in names if name not in figures]:
         raise UsageError(f"{args.results} has no figure {foreign[0]!r}, only {', '.join(figures)}")
     folder, rule = Path(args.output_dir), args.overwrite
     make_folder(folder, "--output-dir ")
+    stem = Path(args.results).stem
+    # Figure 4 is written to study-figure-4.png.
     paths = {
-        name: folder / f"{Path(args.results).stem}-{label(name)}.{args.format}" for name in names
+        name: folder / f"{stem}-{'figure-' * name.isdigit()}{name}.{args.format}" for name in names
     }
-    animation = animation_of(args, kind)
-    for path in animation:
-        check_ending(path, (".gif",))
-    check_outputs((*paths.values(), *animation), rule, [args.results])
+    if args.animation and kind.animate is None:
+        able = " or ".join(each.title for each in studies() if each.animate)
+        raise UsageError(
+            f"--animation is for {able}; for one collision use flocsim trajectory --animation"
+        )
+    animation = list(filter(None, [args.animation]))
+    check_outputs(animation, rule, [args.results], endings=(".gif",))
+    check_outputs(paths.values(), rule, [args.results])
     for name, path in paths.items():
         draw = figures[name]
         thin = args.numerics and "numerics" in inspect.signature(draw).parameters
@@ -72,23 +77,6 @@ def run(args: argparse.Namespace) -> int:
         kind.animate(path, content, rule=rule)
         print(path)
     return 0
-
-
-def animation_of(args: argparse.Namespace, kind: Contents) -> list[Path]:
-    """Return [path of the animation asked for]; UsageError where there can be none."""
-    if not args.animation:
-        return []
-    if kind.animate is None:
-        able = " or ".join(each.title for each in studies() if each.animate)
-        raise UsageError(
-            f"--animation is for {able}; for one collision use flocsim trajectory --animation"
-        )
-    return [Path(args.animation)]
-
-
-def label(name: str) -> str:
-    """Return a figure's name in names of files."""
-    return f"figure-{name}" if name.isdigit() else name
 
 
 def read_content(path: Any) -> tuple[Contents, Any, str, str]:

@@ -31,7 +31,6 @@ from flocsim.io.files import make_folder, write_file
 from flocsim.io.journal import Lock
 from flocsim.io.json_text import read_json
 from flocsim.io.seals import held, sha256_of
-from flocsim.io.terminal import duration
 from flocsim.process import INTERRUPTED, SIGNALS, STOPPED, WITHHELD, deferred, handle
 
 KINDS = {"clay": "clay", "tang2014": "paper", "si": "measured"}
@@ -46,9 +45,6 @@ FORM: dict[str, Any] = {"source": {}, "made": {}, "shown": {}}
 """The record of a folder, as a pattern of `flocsim.io.json_text`: of what the shapes were made;
 {file: checksum} of what the study has made, "" while it makes it; {figure or report: the results
 that it shows}."""
-
-SECONDS = {"picture": 3.0, "replicate": 0.1, "study": 15.0}
-"""CPU time of a picture, of a replicate of all conditions, and of all else in a study."""
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -164,11 +160,7 @@ def make_study(args: Namespace) -> int:
     if missing := [path for path in pictures if not path.is_file()]:
         raise UsageError(f"{missing[0]} is not a file: name pictures, or a folder of pictures")
     presets = list(dict.fromkeys(args.preset or ["clay", "tang2014"]))
-    work = SECONDS["picture"] * len(pictures)
-    work += SECONDS["replicate"] * (args.replicates or 100) * len(presets)
-    lasts = duration(work / args.jobs + SECONDS["study"] * len(presets))
     with open_folder(Path(args.output)) as folder:
-        print(f"takes about {lasts}, and a minute or two more the first time that flocsim runs")
         fit_shapes(args, pictures, folder)
         code = max(run_preset(args, preset, folder) for preset in presets)
         results = [folder.path / f"{preset}.h5" for preset in presets]

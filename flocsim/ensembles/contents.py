@@ -428,13 +428,16 @@ class Differences(Tables):
         both = f"the {self.pairs} {self.noun} that both have, paired"
         how = both if self.paired else "independent samples"
         title = f"{with_unit(text, unit)}, second minus first: {how}"
-        lines = [*self.changes, title, "", *aligned(rows_along(axes, heads, row))]
-        lines.append(
-            "[low, high]: 95 % interval of sampling; *: without 0, numerical error included"
-        )
+        rows = rows_along(axes, heads, row)
+        lines = [*self.changes, title, "", *aligned(rows), "[low, high]: 95 % sampling interval."]
         if known and np.isfinite(error).any():
             most = f"±{np.nanmax(error):.3f} at most in any condition (95 %)"
             lines.append(f"Numerical error: exact runs would change a difference by {most}.")
+        stars = f"{sum(cells[-1] == '*' for cells in rows)} of {len(rows) - 1}"
+        lines.append(
+            f"{stars} differences are significant (*): their interval, numerical error included, "
+            "does not contain 0. By chance 1 in 20 would be."
+        )
         return "\n".join(lines)
 
     def interval(self, at: Mapping[str, float]) -> str:

@@ -1,7 +1,7 @@
 """The table of a study for the terminal."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -49,7 +49,7 @@ def format_table(results: Results, numerics: bool, every: bool = False) -> str:
     found = lines[:1]
     for (t, *first), line in zip(conditions, lines[1:], strict=True):
         found += [line] if any(first) else [f"type {type_in_words(results, t)}", line]
-    return "\n".join([*found, *LEGEND, *graze_lines(results.delta)])
+    return "\n".join([*found, *LEGEND, *[GRAZE] * (1.0 in results.delta)])
 
 
 def type_in_words(results: Results, t: int) -> str:
@@ -100,11 +100,6 @@ def others(table: Mapping[str, np.ndarray], at: tuple[int, ...]) -> str:
 
 
 GRAZE = "δ = 1: outlines just graze, or miss, by construction; it says little about collisions."
-
-
-def graze_lines(delta: Sequence[float] | np.ndarray) -> list[str]:
-    """Return what to say of a displacement by all of delta_max, where there is one."""
-    return [GRAZE] if 1.0 in np.asarray(delta) else []
 
 
 def efficiency_lines(results: Results) -> list[str]:

@@ -13,24 +13,13 @@ const long = [...words.keys()].filter((word) => !alone(word)).sort((a, b) => b.l
 const pattern = new RegExp(`(?<![\\w\\[])(${long.join('|')})s?(?![\\w\\]])`, 'g');
 const used = new Set();
 function link(element) {
-  const seen = new Set();
-  const walker = document.createTreeWalker(element, NodeFilter.SHOW_TEXT), texts = [];
-  while (walker.nextNode()) texts.push(walker.currentNode);
-  for (const node of texts) {
-    const whole = node.data.trim(), parts = [];
-    const found = words.has(whole) ? [[node.data, whole]] : [...node.data.matchAll(pattern)];
-    let end = 0;
-    for (const match of found) {
-      const dt = words.get(match[1]), start = match.index ?? 0;
-      if (seen.has(dt) || dt.nextElementSibling === element) continue;
-      seen.add(dt); used.add(dt);
-      const a = document.createElement('a');
-      a.className = 'word'; a.href = '#' + dt.id; a.textContent = match[0];
-      parts.push(node.data.slice(end, start), a);
-      end = start + match[0].length;
-    }
-    node.replaceWith(...parts, node.data.slice(end));
-  }
+  const seen = new Set(), whole = element.textContent.trim();
+  element.innerHTML = element.innerHTML.replace(words.has(whole) ? whole : pattern, (text, word) => {
+    const dt = words.get(words.has(whole) ? whole : word);
+    if (seen.has(dt) || dt.nextElementSibling === element) return text;
+    seen.add(dt); used.add(dt);
+    return `<a class="word" href="#${dt.id}">${text}</a>`;
+  });
 }
 document.querySelectorAll('header p:not(.file), h1, figcaption, th, dl.facts dt, section > p')
   .forEach(link);

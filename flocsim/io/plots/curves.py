@@ -72,7 +72,7 @@ def against_key(results: SweepResults, numerics: bool = False) -> Figure:
                 line = outcomes.bands_in(mine, "pr_a", numerics)
                 outcomes.draw_bars(below, where[order], line, index, colours[index], shift=shift)
             outcomes.note_if_empty(below, columns["pr_a"][number], "no decided collision")
-        grid[0, 0].set_ylabel("share of\nreplicates")
+        grid[0, 0].set_ylabel("fraction of\nreplicates")
         grid[1, 0].set_ylabel(LABELS["pr_a"])
         title = ", ".join(line_title(name, results) for name in others)
         style.place_legend(figure, {

@@ -27,7 +27,7 @@ LABELS = {
     "pr_a_given_outside": r"$\Pr[A\mid C(d_c\geq D_0)]$",
     "pr_a": r"$\Pr[A]$",
     "classes": "Pr[class]",
-    "bonds": "share of bonds",
+    "bonds": "fraction of bonds",
 }
 POINTS = 20.0
 """Points of a slot in which lines are drawn beside each other, where an axis has no slots."""
@@ -128,7 +128,7 @@ def against_delta(results: Results, numerics: bool = False) -> Figure:
 def outcomes(results: Results) -> Figure:
     """What becomes of replicates, stacked to 1: panels by type, N on the axis, a bar each delta."""
     titles = style.type_titles(results.types)
-    with style.panel_grid(titles, "share of replicates") as (figure, panels, spare):
+    with style.panel_grid(titles, "fraction of replicates") as (figure, panels, spare):
         count = results.delta.size
         order = np.argsort(results.vertices)
         places = style.vertex_positions(results.vertices)[order]
@@ -144,14 +144,10 @@ def outcomes(results: Results) -> Figure:
                 ends.draw_ends(axes, places, counts, 0.68 * slot / count, shift)
         style.place_legend(figure, {"": ends.end_handles(results.probabilities)}, spare)
         if count > 1:
-            style.add_foot(figure, f"Bars of each N, from left: δ/δmax = {deltas_of(results)}.")
+            places = ", ".join(f"{place:g}" for place in np.sort(results.delta))
+            grazes = " (grazes)" * places.endswith(" 1")
+            style.add_foot(figure, f"Bars of each N, from left: δ/δmax = {places}{grazes}.")
         return figure
-
-
-def deltas_of(results):
-    """The displacements in ascending order, in words."""
-    shares = [f"{share:g}" for share in np.sort(results.delta)]
-    return ", ".join(shares) + " (grazes)" * (shares[-1] == "1")
 
 
 def against_size(results: Results, numerics: bool = False) -> Figure:
