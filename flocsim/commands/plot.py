@@ -50,9 +50,8 @@ def run(args: argparse.Namespace) -> int:
         names = list(figures)
     if foreign := [name for name in names if name not in figures]:
         raise UsageError(f"{args.results} has no figure {foreign[0]!r}, only {', '.join(figures)}")
-    folder, rule = Path(args.output_dir), args.overwrite
+    folder, stem, rule = Path(args.output_dir), Path(args.results).stem, args.overwrite
     make_folder(folder, "--output-dir ")
-    stem = Path(args.results).stem
     # Figure 4 is written to study-figure-4.png.
     paths = {
         name: folder / f"{stem}-{'figure-' * name.isdigit()}{name}.{args.format}" for name in names

@@ -131,11 +131,6 @@ def verbatim(words: str) -> str:
     return f"<pre>{lines}</pre>"
 
 
-def folded(summary: str, content: str) -> str:
-    """Return content that is shown on a click; "" for none."""
-    return content and f"<details><summary>{text(summary)}</summary>\n{content}</details>"
-
-
 def answer_of(part: Part) -> str:
     """Return what a file found in a large sentence, of which flocs and water, and its warnings."""
     kind, found = part.kind, part.found
@@ -218,19 +213,18 @@ def table_of(part: Part) -> str:
 
 
 def made_of(part: Part) -> str:
-    """Return how a file was made: its preset, flocs and command; its config and all that `flocsim
-    info` prints are folded."""
+    """Return how a file was made: its preset, flocs and command; all that `flocsim info`
+    prints is folded."""
     run = getattr(part.found, "run", {})
     facts = "\n".join(
         f"<dt>{text(name.replace('_', ' '))}</dt><dd>{text(run[name])}</dd>"
         for name in SHOWN
         if run.get(name, "") != ""
     )
-    config, info = str(run.get("config", "")), text_of(part.path, part.kind, part.found)
+    info = text_of(part.path, part.kind, part.found)
     return (
         f"<dl class='facts'>{facts}</dl>\n{thumbnails(part.outlines)}\n"
-        f"{folded('The config file', config and verbatim(config))}\n"
-        f"{folded('All that flocsim info prints', verbatim(info))}"
+        f"<details><summary>All that flocsim info prints</summary>\n{verbatim(info)}</details>"
     )
 
 

@@ -63,7 +63,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     --output FOLDER: folder to make, and to go on in (default: %(default)s)
     --replicates K: pairs in each condition (default: as the configs say, 100)
     --preset: preset to run; may be repeated (default: clay and tang2014)
-    --fit OPTIONS: further options of flocsim fit, as --fit='--flocs bright --drop 023.png#3'
+    --fit OPTIONS: further options of flocsim fit, as --fit='--flocs bright --neck 0'
     --jobs K: number of processes (default: one for each core, here %(default)s)
     --overwrite: make anew what other pictures, or another config, have given; each old file is
         kept, clay.h5 as clay.1.h5
@@ -164,21 +164,15 @@ def make_study(args: Namespace) -> int:
         fit_shapes(args, pictures, folder)
         code = max(run_preset(args, preset, folder) for preset in presets)
         results = [folder.path / f"{preset}.h5" for preset in presets]
-        page = typed(folder.path / REPORT)
-        words = ["report", *map(typed, results), "-o", page, *["--overwrite"] * args.overwrite]
-        folder.make(REPORT, *words, of=results)
+        words = ["report", *map(str, results), "-o", str(folder.path / REPORT)]
+        folder.make(REPORT, *words, *["--overwrite"] * args.overwrite, of=results)
         for path in results:
             kind, file = open_kind(path)
             found = kind.read(file)
             print("", kind.setting(found), kind.answer(found), sep="\n")
-        review = folder.path / "shapes-review.html"
-        print(f"\nall on one page: {page}\ncheck the outlines, and leave out flocs, on {review}")
+        print(f"\nall on one page: {folder.path / REPORT}")
+        print(f"check the outlines, and leave out flocs, on {folder.path / 'shapes-review.html'}")
     return code
-
-
-def typed(path: str | os.PathLike) -> str:
-    """Return a path as an argument that is not taken for an option."""
-    return f"./{path}" if str(path).startswith("-") else str(path)
 
 
 def call(*words: str) -> int:
@@ -225,10 +219,10 @@ def fit_shapes(args: Namespace, pictures: Sequence[Path], folder: StudyFolder) -
     # Without a source the shapes of a process that is killed now are not taken for the new ones.
     folder.record["source"] = {}
     folder.save()
-    words = ["fit", *map(typed, args.images), *args.fit]
+    words = ["fit", *args.images, *args.fit]
     words += ["--pixel-size", repr(args.pixel_size)] * (args.pixel_size is not None)
     words += ["--vertices", "4,16,64", "--radius", "1", "--jobs", str(args.jobs)]
-    words += ["-o", typed(shapes), "--review"]
+    words += ["-o", str(shapes), "--review"]
     call(*words, *["--overwrite"] * shapes.exists())
     folder.record["source"] = source
     folder.save()
@@ -238,7 +232,7 @@ def run_preset(args: Namespace, preset: str, folder: StudyFolder) -> int:
     """Do what is missing of the study with a preset: config, results and figures; return the exit
     code of its run."""
     shapes, config, results, figures = (
-        typed(folder.path / name)
+        str(folder.path / name)
         for name in ("shapes.h5", f"{preset}.toml", f"{preset}.h5", "figures")
     )
     rule = ["--overwrite"] * args.overwrite

@@ -456,20 +456,6 @@ class Differences(Tables):
         )
         return "*" if low > 0.0 or high < 0.0 else ""
 
-    def without_spread(self) -> "Differences":
-        """Return the differences with all intervals of 0, as of a study and itself."""
-        exact = ("difference_low", "difference_high", "change_low", "change_high")
-        arrays = {
-            quantity: {
-                name: each["difference"] if name in exact else values
-                for name, values in each.items()
-            }
-            for quantity, each in self.arrays.items()
-        }
-        return attrs.evolve(
-            self, arrays=arrays, changes=("Both files hold the same replicates of one study.",)
-        )
-
 
 def stored_in(results: Any, name: str = "identity") -> dict[str, Any]:
     """What the group ``run`` of results has as JSON, by default what their rows follow from;
@@ -525,11 +511,19 @@ def compare(first: Any, second: Any) -> Differences:
         If they have no condition in common, or are of two kinds.
     """
     name, other = (getattr(each, "format", "") for each in (first, second))
-    if name == other and name in STUDIES and contents_of(name).compare is not None:
-        found: Differences = contents_of(name).compare(first, second)
-        differences = [each["difference"] for each in found.arrays.values()]
-        same = found.paired and not found.changes and not np.any(np.nan_to_num(differences))
-        return found.without_spread() if same else found
-    words = " and ".join(type(each).__name__ for each in (first, second))
-    able = ", or ".join(f"two {each.title}" for each in studies() if each.compare)
-    raise UsageError(f"{able} can be compared: found {words}")
+    if name != other or name not in STUDIES or contents_of(name).compare is None:
+        words = " and ".join(type(each).__name__ for each in (first, second))
+        able = ", or ".join(f"two {each.title}" for each in studies() if each.compare)
+        raise UsageError(f"{able} can be compared: found {words}")
+    found: Differences = contents_of(name).compare(first, second)
+    differences = [each["difference"] for each in found.arrays.values()]
+    if not found.paired or found.changes or np.any(np.nan_to_num(differences)):
+        return found
+    # Of a study and itself all is known exactly.
+    exact = ("difference_low", "difference_high", "change_low", "change_high")
+    arrays = {
+        quantity: {k: each["difference"] if k in exact else v for k, v in each.items()}
+        for quantity, each in found.arrays.items()
+    }
+    same = "Both files hold the same replicates of one study."
+    return attrs.evolve(found, arrays=arrays, changes=(same,))

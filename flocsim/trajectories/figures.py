@@ -71,7 +71,7 @@ def frames_at(
     )
 
 
-APPROACH_FRAMES, CONTACT_FRAMES = 50, 100
+APPROACH_FRAMES, CONTACT_FRAMES = 30, 60
 """Frames of a motion on a page before the first touch and from then on: it shows the contact."""
 
 FIGURES = ("strip", "distance", "forces", "energies")

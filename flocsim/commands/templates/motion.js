@@ -72,6 +72,7 @@ function graph(data, panel) {
     const level = Y(data.zone);
     svg('rect', {x: left, y: level, width: right - left, height: bottom - level, class: 'zone'}, root);
     svg('path', {d: `M${left},${level}H${right}`, class: 'edge'}, root);
+    write(`D₀ = ${data.zone.toPrecision(4)} µm`, right, level - 4, 'end');
   }
   for (const [from, to, across] of [[times[0], times.at(-1), true], [low, high, false]]) {
     const step = round((to - from) / 3);
@@ -89,7 +90,6 @@ function graph(data, panel) {
   svg('path', {d: `M${left},${top}V${bottom}H${right}`, class: 'axis'}, root);
   const line = times.map((t, k) => `${X(t).toFixed(1)},${Y(data.distance[k]).toFixed(1)}`);
   svg('path', {d: 'M' + line.join(' '), class: 'line'}, root);
-  if (data.zone !== null) write(`D₀ = ${data.zone.toPrecision(4)} µm`, right, Y(data.zone) - 4, 'end');
   write(`time [${data.unit[0]}]`, (left + right) / 2, H - 6, 'middle');
   svg('text', {transform: `translate(12,${(top + bottom) / 2}) rotate(-90)`, 'text-anchor': 'middle'},
     root).textContent = 'centre distance [µm]';

@@ -31,7 +31,8 @@ def dry_run(config: Config, ranks: int, pilot: bool = False, verbose: bool = Fal
     """
     measured = measured_flocs(config)
     lines = study_lines(config, ranks)
-    lines += pilot_lines(config, ranks) if pilot else [UNKNOWN_TIME]
+    unknown = "time: not known; --pilot runs replicates for a few seconds to estimate it"
+    lines += pilot_lines(config, ranks) if pilot else [unknown]
     lines += warning_lines(study_warnings(config, measured))
     if verbose:
         pairs = list(sphere_pairs(config, measured))
@@ -44,11 +45,8 @@ def dry_run(config: Config, ranks: int, pilot: bool = False, verbose: bool = Fal
             *(f"  {name}: {line}" for name, pair in pairs for line in scale_lines(pair.system)),
         ]
     ran = "only the pilot was run" if pilot else "nothing was run"
-    return "\n".join([*lines, f"{ran} (--dry-run){'' if verbose else VERBOSE}"])
-
-
-UNKNOWN_TIME = "time: not known; --pilot runs replicates for a few seconds to estimate it"
-VERBOSE = "; --verbose shows collisions, forces and time scales"
+    more = "" if verbose else "; --verbose shows collisions, forces and time scales"
+    return "\n".join([*lines, f"{ran} (--dry-run){more}"])
 
 
 def study_lines(config: Config, ranks: int) -> list[str]:

@@ -1,6 +1,5 @@
 """What a study of pairs says in one sentence, and of which flocs and which water it says so."""
 
-import contextlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,6 @@ from flocsim.ensembles.config.schema import PRESETS, BodiesConfig
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.errors import ConfigError
-from flocsim.fields import read_number
 from flocsim.io.results.events import AGGREGATED, HOOK
 from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.run_group import stored
@@ -23,10 +21,10 @@ MOST_HANGING = 0.005
 """Fraction of the aggregated pairs up to which those that hang are not mentioned."""
 
 SURFACES = (
-    ("double_layer", "potential", "V", 1e3, "surface potential {:.3g} mV"),
-    ("van_der_waals", "hamaker", "J", 1.0, "Hamaker constant {:.2g} J"),
+    ("double_layer", "potential", "V", "surface potential"),
+    ("van_der_waals", "hamaker", "J", "Hamaker constant"),
 )
-"""Force, key, unit, factor and words of what is said of the surfaces."""
+"""Force, key, unit and words of what is said of the surfaces."""
 
 PHYSICS = ("bodies", "fluid", "forces", "zone")
 """Tables whose values a preset gives."""
@@ -154,7 +152,8 @@ def setting_sentence(results: Results) -> str:
     if name and (own := [each for each in PHYSICS if table.get(each) != preset.get(each)]):
         words += f" with values of its own for {' and '.join(own)}"
     if fluid is not None and bodies is not None:
-        known = weight_of(bodies, fluid), water_of(fluid), *surfaces_of(table.get("forces", {}))
+        water = fluid.words.partition(":")[0] or f"water of {1e3 * fluid.viscosity:.3g} mPa s"
+        known = weight_of(bodies, fluid), water, *surfaces_of(table.get("forces", {}))
         words += f": {', '.join(known)}"
     return f"{words}."
 
@@ -169,14 +168,9 @@ def weight_of(bodies: BodiesConfig, fluid: Fluid) -> str:
     return f"{bodies.surface_density:g} kg/m² of projected area{sunk}"
 
 
-def water_of(fluid: Fluid) -> str:
-    """Return the water, in words."""
-    described = fluid.words.partition(":")[0]
-    return described or f"water of {1e3 * fluid.viscosity:.3g} mPa s"
-
-
 def surfaces_of(forces: Mapping[str, Any]) -> Iterator[str]:
     """Yield the potential and the Hamaker constant of the built-in forces that there are."""
-    for force, key, unit, scale, words in SURFACES:
-        with contextlib.suppress(ValueError, TypeError, KeyError):
-            yield words.format(scale * read_number(forces[force][key], unit))
+    for force, key, unit, words in SURFACES:
+        if isinstance(table := forces.get(force), dict) and key in table:
+            value = table[key]
+            yield f"{words} {value}{f' {unit}' * (not isinstance(value, str))}"

@@ -101,19 +101,15 @@ def swept_table(table: Labelled) -> tuple[Sequence[str], Row]:
     return ("n", *ends, "Pr[A] [low, high]"), row
 
 
-ON_EXAMPLES = (
-    "One pair of each class, run again from the seed and seen from the receiving floc: of those "
-    "with the most vertices the one whose time from touch to decision is nearest to the upper "
-    "quartile, long enough to see what happens in contact and no exception. Frames are spaced by "
-    "distance, not by time. Red rings mark contacts."
-)
-
-
 class PairFiles(Contents):
     """What becomes of the rows of a study of pairs or rates; what commands show of its files."""
 
     title = "results of a collision ensemble"
-    on_examples = ON_EXAMPLES
+    on_examples = (
+        "One pair of each class, run again from the seed and seen from the receiving floc: of the "
+        "most vertices, and in contact longer than three quarters of its class. Frames are spaced "
+        "by distance, not by time. Red rings mark contacts."
+    )
     first = ("kernels", "efficiency", "outcomes", "delta", "8")
     file = schema.RESULTS
     compared = schema.COMPARED

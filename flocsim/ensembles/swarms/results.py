@@ -36,12 +36,6 @@ from flocsim.io.results.run_group import stored
 from flocsim.io.results.swarm_file import SwarmResults
 from flocsim.io.terminal import in_words
 
-ON_EXAMPLES = (
-    "Each cluster of two or more flocs has a colour; single flocs are grey. "
-    "Between snapshots, positions are interpolated. Along the sides on which the box repeats "
-    "itself, the view moves with the flocs."
-)
-
 # What is saved of a replicate while it runs.
 
 Arrays = Mapping[str, np.ndarray]
@@ -239,7 +233,11 @@ class SwarmFiles(Contents):
     rows = staticmethod(swarm_file.rows_of)
     table = staticmethod(swarm_file.table_of)
     compared = {name: words for name, (_, _, words) in swarm_file.COUNTS.items()}  # noqa: RUF012
-    on_examples = ON_EXAMPLES
+    on_examples = (
+        "Each cluster of two or more flocs has a colour; single flocs are grey. "
+        "Between snapshots, positions are interpolated. Along the sides on which the box repeats "
+        "itself, the view moves with the flocs."
+    )
     first = ("snapshots", "clusters", "sizes")
     swept = ("counts",)
     swept_table = staticmethod(swept_table)

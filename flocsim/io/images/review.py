@@ -13,7 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.errors import FileError, UsageError, plural
+from flocsim.errors import FileError, UsageError
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.reading import check_file
 from flocsim.io.images.regions import Region
@@ -101,12 +101,8 @@ def judged(path: str, found: Choices, by_eye: Choices | None) -> Choices:
     if by_eye["sha256"] != found["sha256"]:
         raise misfit(path, f"{name} is another file, or has changed since then")
     ours, theirs = found["flocs"], by_eye["flocs"]
-    if len(ours) != len(theirs):
-        counts = f"{plural(len(ours), 'region')} now, but {len(theirs)} then"
-        raise misfit(path, f"{name} has {counts}")
-    for one, other in zip(ours, theirs, strict=True):
-        if not is_same(one, other):
-            raise misfit(path, f"floc {one['floc']} of {name} is not the one that was judged")
+    if len(ours) != len(theirs) or not all(map(is_same, ours, theirs)):
+        raise misfit(path, f"other regions are found in {name} now than were judged")
     return by_eye
 
 

@@ -142,7 +142,6 @@ def instructive_of_each(results: Results) -> dict[str, tuple[tuple[int, int, int
         wanted = np.quantile(times[of_class], 0.75)
         distances = np.where(of_class, np.abs(times - wanted), np.inf)
         t, v, d, row = map(int, np.unravel_index(distances.argmin(), distances.shape))
-        time, many = 1e3 * times[t, v, d, row], np.count_nonzero(of_class)
-        why = f"{time:.3g} ms from touch to decision, chosen from {many} pairs"
+        why = f"{1e3 * times[t, v, d, row]:.3g} ms from touch to decision"
         found[name] = (t, v, d, row), why
     return found
