@@ -87,7 +87,8 @@ def part_of(path: str, allowed: Allowed, motion: bool) -> Part:
     found = kind.read(file)
     if not motion:
         return Part(path, kind, found)
-    return Part(path, kind, found, kind.examples(file, allowed), kind.outlines(file, allowed))
+    opened = kind.opened(file, allowed)
+    return Part(path, kind, found, kind.examples(opened), kind.outlines(opened))
 
 
 def report_page(parts: Sequence[Part]) -> str:

@@ -149,11 +149,11 @@ class Contents:
         """Return what a script has of it; ``allowed``: modules that may be imported."""
         return self.read(path)
 
-    def examples(self, path: Any, allowed: Allowed) -> list[Example]:
-        """Return motions that are worth watching."""
+    def examples(self, opened: Any) -> list[Example]:
+        """Return motions that are worth watching, of what `opened` gives."""
         return []
 
-    def outlines(self, path: Any, allowed: Allowed) -> dict[str, Any]:
+    def outlines(self, opened: Any) -> dict[str, Any]:
         """Return {name of a floc: its Shape}, of those that a study draws from."""
         return {}
 

@@ -347,9 +347,9 @@ class StudyResults(Tables):
         )
 
 
-def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
+def examples_of(opened: StudyResults) -> list[Example]:
     """Return a replicate of each class that the file has, chosen by `instructive_of_each`."""
-    opened, found = StudyResults(path, allowed), []
+    found = []
     for outcome, ((t, v, d, k), why) in instructive_of_each(opened.results).items():
         name, vertices, delta = opened.types[t], int(opened.vertices[v]), float(opened.delta[d])
         heading = CLASS_WORDS[outcome]
@@ -363,11 +363,13 @@ def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
     return found
 
 
-def outlines_of(path: str | os.PathLike, allowed: Allowed) -> dict[str, Shape]:
+def outlines_of(opened: StudyResults) -> dict[str, Shape]:
     """Return the flocs that the study of a file draws from, by name; none where its config cannot
     be used here."""
     try:
-        flocs = flocs_of(StudyResults(path, allowed).config)
+        # Replicates that were run again have read the flocs.
+        again = [study.flocs for study in opened.studies.values()]
+        flocs = again[0] if again else flocs_of(opened.config)
     except FlocsimError:
         return {}
     return {floc.name: floc.shapes[max(floc.shapes)] for floc in flocs if floc.shapes}

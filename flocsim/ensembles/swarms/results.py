@@ -310,11 +310,11 @@ class SwarmFiles(Contents):
             f"average, in a cluster of {size:.2g}{over}."
         )
 
-    def examples(self, path: Any, allowed: Any) -> list[Example]:
+    def examples(self, opened: Any) -> list[Example]:
         """Return the motion of the first swarm, by its snapshots."""
         from flocsim.io.plots.swarm import motion_data
 
-        return [Example("First swarm", "", motion_data(self.read(path)))]
+        return [Example("First swarm", "", motion_data(opened))]
 
     def running(self, found: Any) -> Facts:
         """Return facts of swarms that still run."""
