@@ -170,9 +170,14 @@ class Fluid:
     @property
     def permittivity(self) -> float:
         """Relative permittivity ε_r [-]."""
-        # Of sea water the equivalent concentration of its ions.
-        salt = self.ionic_strength or water.sea_normality(self.salinity or 0.0)
-        return self.of_water(lambda warmth, _: water.permittivity(warmth, salt), WATER_PERMITTIVITY)
+
+        def law(warmth: float, salinity: float) -> float:
+            # Other salts reduce it as sea water of the same ionic strength does.
+            if self.ionic_strength is not None:
+                salinity = water.sea_salinity(warmth, self.ionic_strength)
+            return water.permittivity(warmth, salinity)
+
+        return self.of_water(law, WATER_PERMITTIVITY)
 
     @property
     def debye_length(self) -> float | None:

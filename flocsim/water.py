@@ -3,9 +3,10 @@ one atmosphere.
 
 Density: Millero and Poisson (1981), Deep-Sea Research 28A, 625 (the standard EOS-80), ± 0.004
 kg/m³. Viscosity: Sharqawy, Lienhard and Zubair (2010), Desalination and Water Treatment 16, 354,
-eqs. 22 and 23, ± 1.5 %. Permittivity: Malmberg and Maryott (1956), J. Res. Natl. Bur. Stand. 56, 1,
-times what a salt leaves of it: Stogryn (1971), IEEE Trans. Microwave Theory Tech. 19, 733.
-Ionic strength of sea water: Millero (1982), Ocean Sci. Eng. 7, 403.
+eqs. 22 and 23, ± 1.5 %. Permittivity of pure water: Malmberg and Maryott (1956), J. Res. Natl. Bur.
+Stand. 56, 1; reduced by salt as in sea water: Meissner and Wentz (2004), IEEE Trans. Geosci. Remote
+Sens. 42, 1836, ± 1 % up to 40 g/kg. Ionic strength of sea water: Millero (1982), Ocean Sci. Eng. 7,
+403.
 """
 
 import math
@@ -43,17 +44,21 @@ def viscosity(temperature: float, salinity: float = 0.0) -> float:
     return fresh * (1.0 + linear * s + square * s * s)
 
 
-def permittivity(temperature: float, normality: float = 0.0) -> float:
-    """ε_r [-] at a temperature [K] with a salt of a normality [mol/m³], that of charges of one
-    sign: of NaCl its concentration; up to 3 mol/l."""
-    t, n = temperature - ZERO_CELSIUS, 1e-3 * normality
+def permittivity(temperature: float, salinity: float = 0.0) -> float:
+    """Return ε_r [-] at a temperature [K] and a salinity [g/kg]: 71.8 at 20 °C and 35 g/kg.
+
+    Klein and Swift (1977), IEEE Trans. Antennas Propag. 25, 104, give 72.5 there; NaCl of the same
+    ionic strength has 71 to 72 (Nörtemann et al. 1997, J. Phys. Chem. A 101, 6864; Buchner et al.
+    1999, J. Phys. Chem. A 103, 1).
+    """
+    t, s = temperature - ZERO_CELSIUS, salinity
     fresh = polynomial(t, 87.740, -0.40008, 9.398e-4, -1.410e-6)
-    return fresh * polynomial(n, 1.0, -0.2551, 5.151e-2, -6.889e-3)
+    return fresh * math.exp(s * (-3.56417e-3 + 4.74868e-6 * s + 1.15574e-5 * t))
 
 
-def sea_normality(salinity: float) -> float:
-    """The normality [mol/m³] of sea water of a salinity [g/kg] (Stogryn 1971)."""
-    return 1e3 * salinity * polynomial(salinity, 1.707e-2, 1.205e-5, 4.058e-9)
+def sea_salinity(temperature: float, ionic_strength: float) -> float:
+    """Return the salinity [g/kg] of the sea water of an ionic strength [mol/m³]; ± 3 %."""
+    return ionic_strength / (19.924e-3 * density(temperature))
 
 
 def ionic_strength(temperature: float, salinity: float) -> float:

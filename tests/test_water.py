@@ -37,15 +37,22 @@ def test_viscosity_of_sea_water():
 def test_permittivity_of_fresh_and_salt_water():
     assert water.permittivity(ZERO + 25) == pytest.approx(78.30, abs=0.01)
     assert water.permittivity(ZERO) == pytest.approx(87.74, abs=0.01)
-    # NaCl at 1 mol/l: 61 to 63, Hasted, Ritson and Collie (1948), J. Chem. Phys. 16, 1.
-    assert 61 < water.permittivity(ZERO + 25, 1000.0) < 63
+    # Klein and Swift (1977): 72.47; Meissner and Wentz (2004): 71.80.
+    assert water.permittivity(ZERO + 20, 35) == pytest.approx(71.8, abs=0.15)
+
+
+@pytest.mark.parametrize("molar", [0.1, 0.3, 0.617, 1.0])
+def test_permittivity_of_sodium_chloride(molar):
+    """78.36 − 15.45 c + 3.76 c^1.5 at 25 °C: Buchner et al. (1999), J. Phys. Chem. A 103, 1."""
+    found = Fluid(ionic_strength=1e3 * molar).permittivity
+    assert found == pytest.approx(78.36 - 15.45 * molar + 3.76 * molar**1.5, rel=0.015)
 
 
 def test_ions_of_the_ocean():
     """.7226 mol per kg of water at 35 g/kg: Millero (1982)."""
     per_litre = water.ionic_strength(ZERO + 25, 35)
     assert per_litre / water.density(ZERO + 25, 35) / 0.965 == pytest.approx(0.7226, rel=1e-3)
-    assert water.sea_normality(35) == pytest.approx(612.7, abs=0.5)
+    assert water.sea_salinity(ZERO + 25, per_litre) == pytest.approx(35, rel=0.03)
 
 
 def test_debye_length_of_a_thin_salt():
@@ -70,7 +77,7 @@ def test_salt_alone_is_at_room_temperature():
 def test_words_of_water():
     words = Fluid(temperature="15 °C", salinity=35.0).words
     assert words.startswith("water of 15 °C and 35 g/kg of salt: viscosity 1.22 mPa s")
-    assert words.endswith("Debye length 0.335 nm")
+    assert words.endswith("Debye length 0.341 nm")
     assert "ionic strength of 0.001 mol/l" in Fluid(ionic_strength="1 mmol/l").words
 
 
