@@ -23,9 +23,10 @@ from flocsim.body import Body, Fluid
 from flocsim.constants import BOLTZMANN
 from flocsim.errors import UsageError
 from flocsim.fields import above_zero, check_whole, is_number
-from flocsim.forces.base import Force, PairForce
+from flocsim.forces.base import ContactForce, Force, PairForce
 from flocsim.forces.body_forces import random_key, thermal_forces
 from flocsim.forces.codegen import laws_of
+from flocsim.forces.contact import Contact
 from flocsim.forces.outline import needs_both_shapes, refuse_outlines
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.shapes.shape import Sphere
@@ -269,6 +270,10 @@ def brownian_meetings(
             f"{far:g} m, found {near:g} m"
         )
     one, other = bodies
+    # Kicks are cut near what a body interacts with. Here a touch ends the run, so that a contact
+    # force has them cut near the other body, and never acts.
+    if not any(isinstance(force, ContactForce) for force in forces):
+        forces = [*forces, Contact()]
     system = System(
         [attrs.evolve(one, position=(0.0, 0.0)), attrs.evolve(other, position=(0.0, near))],
         forces, integrator or Overdamped(), fluid or Fluid(), seed=seed,

@@ -397,9 +397,9 @@ def check_box(shapes: Sequence[Shape], box: tuple[float, float], reach: float) -
     least = LEAST_BOX * (2.0 * largest + reach)
     if side < least:
         raise UsageError(
-            f"the box is {side:.3g} m wide, but forces reach {reach:.3g} m between bodies of up to "
-            f"{2.0 * largest:.3g} m: make the box at least {least:.3g} m wide, or cut the forces "
-            "at a smaller gap"
+            f"the box is {side:.6g} m wide, but forces reach {reach:.3g} m between bodies of up to "
+            f"{2.0 * largest:.3g} m: make the box at least {(1.0 + 1e-5) * least:.6g} m wide, or "
+            "cut the forces at a smaller gap"
         )
 
 

@@ -8,7 +8,7 @@ import pytest
 from flocsim import Body, Fluid, Sphere, SpheroPolygon
 from flocsim.brownian import brownian_meetings, splitting_probability
 from flocsim.errors import UsageError
-from flocsim.forces import DoubleLayer, StokesDrag, Thermal, VanDerWaals
+from flocsim.forces import Contact, DoubleLayer, StokesDrag, Thermal, VanDerWaals
 
 WATER = Fluid(viscosity=0.89e-3)
 HALF = Body(Sphere(0.5e-6), density=1050.0)
@@ -74,3 +74,13 @@ def test_a_colloid_of_100_nm_touches_as_often_as_its_potential_says():
     assert wanted == pytest.approx(0.7021, abs=5e-5)
     low, high = found.interval(0.999)
     assert low <= wanted <= high
+
+
+def test_meetings_without_a_pair_force_touch_as_those_with_one_that_never_acts():
+    """Kicks are cut near contact, whatever else acts: theory ln(e/b)/ln(e/R)."""
+    alone = [Thermal(), StokesDrag()]
+    first, second = (
+        brownian_meetings([HALF, HALF], forces, 1.3e-6, 2.5e-6, 20, seed=3, fluid=WATER)
+        for forces in (alone, [*alone, Contact()])
+    )
+    assert first.steps == second.steps and np.array_equal(first.times, second.times)
