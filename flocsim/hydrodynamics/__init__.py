@@ -6,7 +6,7 @@ of floc outlines, permeable spheres, and clusters of bodies. May import geometry
 errors.
 """
 
-from flocsim.hydrodynamics.encounters import Meeting, bend
+from flocsim.hydrodynamics.encounters import Meeting, bend, bend_in_flow
 from flocsim.hydrodynamics.pair import Relative, SpherePair
 from flocsim.hydrodynamics.rigid_bodies import PrismDrag, happel_permeability, prism_drag
 from flocsim.hydrodynamics.two_spheres import TwoSpheres
@@ -18,6 +18,7 @@ __all__ = [
     "SpherePair",
     "TwoSpheres",
     "bend",
+    "bend_in_flow",
     "happel_permeability",
     "prism_drag",
 ]

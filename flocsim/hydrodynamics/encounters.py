@@ -365,3 +365,38 @@ def bend(pair: SpherePair, speeds: Sequence[float] | np.ndarray, distance: float
     # decays as 1/r, which adds its last value.
     change = gap / (gap + reach) * (1.0 - (motion.across @ loads) / (motion.along @ loads))
     return float(np.trapezoid(change, log) + change[-1])
+
+
+def bend_in_flow(pair: SpherePair, distance: float) -> tuple[float, float]:
+    """Return (ln φ, ψ [m²]) of two spheres in a flow, which say how far the water between them has
+    displaced a path from that of the undisturbed flow.
+
+    Parameters
+    ----------
+    pair : SpherePair
+    distance : float
+        Distance r of the centres [m].
+
+    Returns
+    -------
+    (float, float)
+        In shear y² = φ² (y∞² + ψ), y across the flow; in extension x y = φ² (x y)∞.
+
+    Notes
+    -----
+    ln φ = ∫ (A − B)/(1 − A) dr/r and ψ = ∫ B r/((1 − A) φ²) dr, from r to infinity: Batchelor and
+    Green (1972), J. Fluid Mech. 56, 375, section 5.
+    """
+    reach = sum(pair.radii)
+    log = np.linspace(
+        math.log(distance - reach), math.log(max(BENDING_END * reach, 4.0 * distance)), 400
+    )
+    gap = np.exp(log)
+    motion, r = pair.relative(gap), gap + reach
+    step, left = np.diff(log), 1.0 - motion.stretch
+    # Both decay as fast as 1/r³: beyond the last distance there is nothing to add.
+    rate = (motion.stretch - motion.shear) / left * gap / r
+    pieces = 0.5 * step * (rate[1:] + rate[:-1])
+    logs = np.append(np.cumsum(pieces[::-1])[::-1], 0.0)
+    turned = motion.shear / left * r * np.exp(-2.0 * logs) * gap
+    return float(logs[0]), float(np.trapezoid(turned, log))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from flocsim.errors import UsageError
 from flocsim.hydrodynamics import Meeting, SpherePair, encounters
@@ -142,3 +143,36 @@ def test_permeable_spheres_touch_more_often_than_solid_ones(long_steps, flow):
 
 def weights_of(radii):
     return tuple(6.0 * np.pi * radius**3 for radius in radii)
+
+
+@pytest.mark.parametrize("radii", [(1.0, 1.0), (0.5, 1.5)])
+@pytest.mark.parametrize("flow", ["shear", "extension"])
+def test_paths_in_a_flow_are_displaced_as_far_as_they_are_integrated(radii, flow):
+    pair, reach = SpherePair(radii), sum(radii)
+    offset, near, far = 0.8 * reach, 3.0 * reach, 60.0 * reach
+    log, square = encounters.bend_in_flow(pair, near)
+
+    def rates(_, place):
+        r = np.hypot(*place)
+        n, motion = place / r, pair.relative(np.array([r - reach]))
+        swept = FLOWS_IN_PLANE[flow] @ place
+        spin = np.array([place[1], -place[0]]) * 0.5 * (flow == "shear")
+        along = swept @ n
+        reduced = motion.stretch[0] * along * n + motion.shear[0] * (swept - along * n)
+        return spin + swept - reduced
+
+    def arrived(_, place):
+        return np.hypot(*place) - near
+
+    arrived.terminal = True
+    start = (-far, offset) if flow == "shear" else (offset**2 / (2.0 * far), far)
+    x, y = solve_ivp(rates, [0.0, 1e4], start, events=arrived, rtol=1e-8, atol=1e-10).y[:, -1]
+    if flow == "shear":
+        assert y == pytest.approx(np.exp(log) * np.sqrt(offset**2 + square), rel=1e-4)
+    else:
+        assert x * y == pytest.approx(0.5 * offset**2 * np.exp(2.0 * log), rel=1e-4)
+
+
+FLOWS_IN_PLANE = {
+    "shear": np.array([[0.0, 0.5], [0.5, 0.0]]), "extension": np.diag([1.0, -1.0])
+}  # fmt: skip

@@ -40,7 +40,7 @@ from flocsim.forces import Gravity
 from flocsim.forces.drag import body_resistance, follows_shape, resistance_matrices
 from flocsim.forces.settling import least_mobility, nonrotating_mobility, terminal_motion
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.hydrodynamics import SpherePair, bend
+from flocsim.hydrodynamics import SpherePair, bend, bend_in_flow
 from flocsim.hydrodynamics.pair import interpolation_weights, node_radii
 from flocsim.hydrodynamics.two_spheres import FADES_FROM
 from flocsim.system import System
@@ -179,6 +179,10 @@ class InFlow(Weightless):
     upstream: ClassVar[Callable[..., tuple[float, float]]]
     """Gives where j starts [m], i at the origin: on the path of an offset, so far away."""
 
+    offset_there: ClassVar[Callable[..., float]]
+    """Gives the offset [m] of the undisturbed path through the start of a pair that comes from
+    infinity at another one."""
+
     approach: ClassVar[Callable[..., float]]
     """Gives the time [s] that the undisturbed flow takes from a start to as far on the other side,
     on a path whose offset is this share of the distance."""
@@ -231,8 +235,20 @@ class InFlow(Weightless):
         passed = min(max(abs(share * self.outer) / self.far, 1e-9), 1.0)
         return self.approach(passed) + LIMIT_TURNS * self.turn_time
 
+    @functools.cached_property
+    def bent(self) -> tuple[float, float]:
+        """φ and ψ [m²] where they start, as `bend_in_flow` has them, the water between bodies taken
+        for that of spheres; 1 and 0 without water."""
+        if self.water is None:
+            return 1.0, 0.0
+        first, second = (shape.equivalent_radius for shape in self.shapes)
+        gap = min(self.far / self.size - 1.0, FADES_FROM * self.water.cut)
+        # Flocs of one size differ in it by rounding.
+        log, square = bent_in_flow(round(second / first, 9), round(gap, 9))
+        return math.exp(log), square * self.size**2
+
     def places(self, angles: Sequence[float], share: float) -> Placed:
-        x, y = self.upstream(share * self.outer, self.far)
+        x, y = self.upstream(self.offset_there(share * self.outer), self.far)
         # Both go along with the flow.
         xx, xy, yx, yy = self.system.fluid.gradient
         spin = 0.5 * (yx - xy)
@@ -272,6 +288,10 @@ class Shear(InFlow):
         along = math.sqrt(far * far - offset * offset)
         return (-along, offset) if offset >= 0.0 else (along, offset)
 
+    def offset_there(self, offset: float) -> float:
+        scale, square = self.bent
+        return math.copysign(scale * math.sqrt(offset * offset + square), offset)
+
     def approach(self, share: float) -> float:
         return 2.0 * math.sqrt(1.0 - share * share) / (share * self.rate)
 
@@ -300,6 +320,9 @@ class Extension(InFlow):
         # The distance is ``far`` where sin 2φ = 2c/far², φ the angle from the y axis.
         lean = 0.5 * math.asin(math.copysign(offset * offset, offset) / (far * far))
         return far * math.sin(lean), far * math.cos(lean)
+
+    def offset_there(self, offset: float) -> float:
+        return self.bent[0] * offset
 
     def approach(self, share: float) -> float:
         return math.log(2.0 / (share * share)) / self.rate
@@ -376,6 +399,16 @@ def offset_near(ratio: float, speeds: float, gap: float) -> float:
         for place, weight in interpolation_weights(ratio)
     )
     return math.exp(-bends)
+
+
+@functools.cache
+def bent_in_flow(ratio: float, gap: float) -> tuple[float, float]:
+    """Return (ln φ, ψ over (r_i + r_j)²) of `bend_in_flow`, of r_j/r_i, at a gap over r_i + r_j."""
+    log, square = 0.0, 0.0
+    for place, weight in interpolation_weights(ratio):
+        bends = bend_in_flow(SpherePair(node_radii(place)), 2.0 * (1.0 + gap))
+        log, square = log + weight * bends[0], square + 0.25 * weight * bends[1]
+    return log, square
 
 
 def yield_of(system: System, body: Body) -> tuple[float, float]:
