@@ -45,6 +45,10 @@ from flocsim.hydrodynamics.pair import interpolation_weights, node_radii
 from flocsim.hydrodynamics.two_spheres import FADES_FROM
 from flocsim.system import System
 
+SAME_SPEED = 5e-4
+"""Relative difference up to which settling speeds count as one: radii are not known so well, and
+bodies would fall thousands of radii before they meet."""
+
 SLACK = 1.5
 """In a flow bodies start at least so many times as far apart as the offset of their path."""
 
@@ -80,10 +84,12 @@ class Settling(Encounter):
                 "pair that has passed may meet again; give another law, or let a flow bring the "
                 "bodies together"
             )
-        if not self.speed > 0.0:
+        fastest = max(math.hypot(*velocity) for velocity, _ in self.settling)
+        if not self.speed > SAME_SPEED * fastest:
             raise UsageError(
-                "the two bodies settle at the same speed and never meet: give scene.pairs two "
-                "different radii, set scene.receiver = 'fixed', or add a missing [forces.gravity]"
+                "the two bodies settle at the same speed and never meet, as their speeds differ by "
+                f"less than {100.0 * SAME_SPEED:g} %: give scene.pairs two different radii, set "
+                "scene.receiver = 'fixed', or add a missing [forces.gravity]"
             )
 
     @functools.cached_property

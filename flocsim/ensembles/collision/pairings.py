@@ -23,6 +23,10 @@ from flocsim.errors import ConfigError, plural
 EXPONENTS = {"number": 0, "area": 2, "volume": 3}
 """Power of r_eq by which a floc's weight grows."""
 
+SAME_SIZE = 1e-3
+"""Relative difference up to which two sizes are one: outlines of pictures do not tell them apart,
+and such flocs settle at nearly the same speed."""
+
 Span = tuple[float, float]
 """The least and the largest equivalent radius [m]."""
 
@@ -93,6 +97,14 @@ class SizeClass:
     sizes: np.ndarray
     weights: np.ndarray
 
+    @property
+    def weights_beside(self) -> tuple[np.ndarray, np.ndarray]:
+        """For each floc the weights of all that are smaller, and of all that are larger."""
+        sums = np.append(0.0, np.cumsum(self.weights))
+        first = np.searchsorted(self.sizes, self.sizes * (1.0 - SAME_SIZE), side="left")
+        stop = np.searchsorted(self.sizes, self.sizes * (1.0 + SAME_SIZE), side="right")
+        return sums[first], sums[-1] - sums[stop]
+
 
 @attrs.frozen(eq=False)
 class TwoClasses(Pairing):
@@ -118,28 +130,23 @@ class TwoClasses(Pairing):
 
     def distribution(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """(sizes [m], weights) of bodies i and j over all pairs."""
-        if self.first is not self.second:
-            both = (self.first, self.second)
-            return [each.sizes for each in both], [each.weights for each in both]
-        sizes, inverse = np.unique(self.first.sizes, return_inverse=True)
-        weights = np.bincount(inverse, self.first.weights)
-        below = np.cumsum(weights) - weights
-        # i is the smaller of two: its weight times that of all that are larger, and the reverse for
-        # j. Exactly 0 for the largest, which is nobody's smaller partner.
-        above = np.append(np.cumsum(weights[:0:-1])[::-1], 0.0)
-        return [sizes, sizes], [weights * above, weights * below]
+        both = (self.first, self.second)
+        weights = [each.weights for each in both]
+        if self.first is self.second:
+            # i is the smaller of two: its weight times that of all that are larger, and the reverse
+            # for j.
+            below, above = self.first.weights_beside
+            weights = [weights[0] * above, weights[0] * below]
+        return [each.sizes for each in both], weights
 
     def choose(self, numbers: Sequence[float] | np.ndarray) -> tuple[int, int]:
         """Two flocs of unlike sizes, as if drawn until they are."""
         own, other = self.first, self.second
-        chances = own.weights
-        if own is other:
-            _, inverse = np.unique(own.sizes, return_inverse=True)
-            # Redrawing until sizes differ favours flocs of rare sizes by 1 − the weight of their
-            # own.
-            chances = chances * (1.0 - np.bincount(inverse, own.weights)[inverse])
+        # Redrawing until sizes differ favours flocs of rare sizes.
+        chances = own.weights * sum(own.weights_beside) if own is other else own.weights
         one = quantile(chances, numbers[2])
-        two = quantile(np.where(other.sizes == own.sizes[one], 0.0, other.weights), numbers[3])
+        alike = np.abs(other.sizes / own.sizes[one] - 1.0) <= SAME_SIZE
+        two = quantile(np.where(alike, 0.0, other.weights), numbers[3])
         pair = int(own.places[one]), int(other.places[two])
         return pair if own.sizes[one] < other.sizes[two] else pair[::-1]
 
@@ -186,7 +193,7 @@ def size_classes(scene: PairScene, flocs: Sequence[Floc]) -> list[SizeClass]:
     classes = []
     for place, label in enumerate(scene.class_labels):
         mine = np.flatnonzero(number == place)
-        if len(set(chosen[mine])) < 2:
+        if len(mine) < 2 or chosen[mine[-1]] <= (1.0 + SAME_SIZE) * chosen[mine[0]]:
             raise ConfigError(
                 f"scene.classes: of {len(order)} flocs of {in_words(chosen)}, class {label} holds "
                 f"{len(mine)}{' of one size' if len(mine) else ''}, which never meet: "

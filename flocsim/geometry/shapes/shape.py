@@ -36,10 +36,14 @@ def read_only(array: np.ndarray) -> np.ndarray:
     return array
 
 
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Lengths [m] between which moments, which grow as the fourth power, are finite and above 0."""
+
+
 def positive_radius(radius: Any) -> float:
     """Return ``radius``, a number or a text such as "5 um", as a float.
 
-    Raises ShapeError unless it is finite and above 0.
+    Raises ShapeError unless it is between SMALLEST and LARGEST.
     """
     if isinstance(radius, np.generic):
         radius = radius.item()
@@ -49,6 +53,10 @@ def positive_radius(radius: Any) -> float:
         raise ShapeError(str(error)) from None
     if not is_number(radius) or radius <= 0.0:
         raise ShapeError(f"the radius must be a finite number above 0 (metres), found {radius!r}")
+    if not SMALLEST <= radius <= LARGEST:
+        raise ShapeError(
+            f"the radius must be between {SMALLEST:g} and {LARGEST:g} m, found {radius!r}"
+        )
     return float(radius)
 
 
@@ -67,6 +75,8 @@ def read_points(name: str, points: ArrayLike, fewest: int = 1) -> np.ndarray:
     if not np.isfinite(array).all():
         row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
         raise ShapeError(f"vertex {row} is not finite: {tuple(array[row].tolist())}")
+    if len(array) and np.abs(array).max() > LARGEST:
+        raise ShapeError(f"vertices must lie within {LARGEST:g} m of the origin")
     return array
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from flocsim.ensembles.collision.flocs import Floc, FlocPool
 from flocsim.ensembles.collision.pairings import (
+    SizeClass,
     TwoClasses,
     TwoSizes,
     quantile,
@@ -144,3 +145,15 @@ def test_a_floc_counts_for_as_many_as_its_pictures_have_hidden():
     (alone,) = size_classes(PairScene(pairs="measured"), flocs)
     expected = [flocs[place].weight for place in alone.places]
     assert np.allclose(alone.weights, np.array(expected) / sum(expected))
+
+
+def test_flocs_whose_sizes_differ_by_less_than_their_errors_do_not_meet():
+    sizes = np.array([5e-6, 5.0001e-6, 7e-6])
+    one = SizeClass("all", np.arange(3), sizes, np.full(3, 1.0 / 3.0))
+    pairing = TwoClasses("pair", one, one)
+    numbers = np.random.default_rng(1).random((200, 4))
+    drawn = {pairing.choose(each) for each in numbers}
+    assert drawn == {(0, 2), (1, 2)}
+    (_, _), (smaller, larger) = pairing.distribution()
+    np.testing.assert_allclose(smaller, [1 / 9, 1 / 9, 0.0])
+    np.testing.assert_allclose(larger, [0.0, 0.0, 2 / 9])

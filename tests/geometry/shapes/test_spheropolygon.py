@@ -25,6 +25,8 @@ WRONG = {
     "points on one line": ([[0, 0], [1, 0], [3, 0]], 1.0, "not simple"),
     "a repeated end": ([[1, 1], [1, 1]], 1.0, "repeat the same point"),
     "nan": ([[0, 0], [4, float("nan")], [4, 4]], 1.0, "vertex 1 is not finite"),
+    "too large": ([[0, 0], [1e160, 0], [0, 1e160]], 1.0, "vertices must lie within"),
+    "too small a radius": ([[0, 0], [4, 0], [0, 4]], 1e-160, "the radius must be between"),
     "infinity": ([[0, 0], [4, 0], [-float("inf"), 4]], 1.0, "vertex 2 is not finite"),
     "one point": ([[0, 0]], 1.0, r"found \(1, 2\); for one point use Sphere"),
     "no point": ([], 1.0, "N ≥ 2"),
