@@ -6,6 +6,9 @@ dimensions, so that
 
     P(r) = ∫_r^b e^(V/k_B T) s^(1−d) ds / ∫_R^b e^(V/k_B T) s^(1−d) ds.
 
+With the water between the spheres, both integrands have D_∞/D(s), too, D being their relative
+diffusion.
+
 Of any two, by letting them go near each other and running them until they touch or have escaped,
 again and again.
 
@@ -25,11 +28,14 @@ from flocsim.errors import UsageError
 from flocsim.fields import above_zero, check_whole, is_number
 from flocsim.forces.base import ContactForce, Force, PairForce
 from flocsim.forces.body_forces import random_key, thermal_forces
+from flocsim.forces.check import kernel_arguments, reach_of
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.contact import Contact
 from flocsim.forces.outline import needs_both_shapes, refuse_outlines
+from flocsim.forces.pair_resistance import Lubrication, PairResistance
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.shapes.shape import Sphere
+from flocsim.hydrodynamics.pair import SpherePair
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Overdamped
 from flocsim.integrators.parts import evaluate_as_they_lie
@@ -46,7 +52,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 LEAST_GAP, PANELS_A_DECADE = 1e-13, 40
 """[m] End of the first panel, and panels of quadrature for a factor of ten in the gap."""
 
-FAR = 1e3
+FAR = 1e6
 """Distance, in r_i + r_j, up to which W is integrated as it stands; beyond, V counts as none."""
 
 TOUCHED, ESCAPED = 1, 2
@@ -75,18 +81,60 @@ def repulsion(
         return repulsion_of_circles(
             [each for each in forces if isinstance(each, PairForce)], radii, fluid
         )
-    pieces = laws_of(forces, fluid)
-    laws = [pieces.laws[name] for name in ("centre_force", "surface_force") if name in pieces.laws]
+    present = laws_of(forces, fluid).used.values()
+    between = [force for force in present if isinstance(force, PairForce)]
+    kernels = [force.kernel_in(fluid) for force in between]
+    calls = [
+        (kernel, kernel_arguments(force, fluid, kernel), limit_of(force))
+        for force, kernel in zip(between, kernels, strict=True)
+    ]
     r_i, r_j = radii
     reduced = r_i * r_j / (r_i + r_j)
 
     def found(gaps):
-        views = [
-            PairView(0.0, g, 0.0, g + r_i + r_j, r_i, r_j, reduced, 1.0) for g in gaps.tolist()
-        ]
-        return np.array([sum(law(view, pieces.parameters) for law in laws) for view in views])
+        total = np.zeros(len(gaps))
+        for kernel, arguments, limit in calls:
+            for k in np.flatnonzero(gaps < limit):
+                gap = float(gaps[k])
+                view = PairView(0.0, gap, 0.0, gap + r_i + r_j, r_i, r_j, reduced, 1.0)
+                total[k] += kernel(view, *arguments)
+        return total
 
     return found
+
+
+def slowing(
+    forces: Sequence[Force], radii: tuple[float, float], gaps: np.ndarray
+) -> np.ndarray:  # fmt: skip
+    """Return D_∞/D of two spheres towards each other at gaps (k,) [m]: 1 without the water between
+    them; UsageError for a force that knows only the nearest part of it."""
+    if any(isinstance(force, Lubrication) for force in forces):
+        raise UsageError(
+            "the diffusion of two spheres needs all of the water between them: give PairResistance "
+            "in the place of Lubrication"
+        )
+    nearest = [force.h_min for force in forces if isinstance(force, PairResistance)]
+    if not nearest:
+        return np.ones(len(gaps))
+    pair = SpherePair(radii)
+    # The relative velocity by two opposite forces, over that of each sphere alone.
+    mobilities = [
+        motion.along[:, 1] - motion.along[:, 0]
+        for motion in (pair.alone(gaps), pair.relative(np.maximum(gaps, nearest[0])))
+    ]
+    return mobilities[0] / mobilities[1]
+
+
+def limit_of(force: PairForce) -> float:
+    """Return the gap [m] up to which a force between two spheres counts.
+
+    The engine leaves flocsim's own forces out where they are negligible against their value at
+    contact; their energy there may still be more than k_B T. So they count up to their ``cut``, if
+    they have one, and forces of one's own up to their ``reach``.
+    """
+    if hasattr(force, "cut"):
+        return math.inf if force.cut is None else float(force.cut)
+    return reach_of(force)
 
 
 def repulsion_of_circles(
@@ -130,8 +178,8 @@ class Profile:
         ends = np.geomspace(LEAST_GAP, far, max(2, round(PANELS_A_DECADE * decades)))
         # Where a law has a kink a panel ends.
         kinks = [getattr(force, "d_min", None) or far for force in forces]
-        reaches = [getattr(force, "reach", far) for force in forces]
-        kept = [each for each in (*kinks, *reaches, *marks) if 0.0 < each < far]
+        limits = [limit_of(force) for force in forces if isinstance(force, PairForce)]
+        kept = [each for each in (*kinks, *limits, *marks) if 0.0 < each < far]
         self.ends = np.unique(np.concatenate([[0.0], ends, kept]))
         self.half = 0.5 * np.diff(self.ends)[:, None]
         self.gaps = self.ends[:-1, None] + self.half * (NODES + 1.0)
@@ -145,12 +193,13 @@ class Profile:
         whole = (self.half * force) @ WEIGHTS
         behind = np.concatenate([np.cumsum(whole[::-1])[::-1], [0.0]])
         self.potential = behind[:-1, None] - within
+        self.slowing = slowing(forces, radii, self.gaps.ravel()).reshape(self.gaps.shape)
 
     def integral(self, begin: float, end: float, dimensions: int) -> float:
-        """∫ e^(V/k_B T) s^(1−d) ds between two gaps that are ends of panels [m^(2−d)]."""
+        """∫ e^(V/k_B T) (D_∞/D) s^(1−d) ds between two gaps that are ends of panels [m^(2−d)]."""
         rows = (self.ends[:-1] >= begin) & (self.ends[1:] <= end)
         distance = self.gaps[rows] + self.total
-        inner = np.exp(self.potential[rows]) * distance ** (1.0 - dimensions)
+        inner = np.exp(self.potential[rows]) * self.slowing[rows] * distance ** (1.0 - dimensions)
         return float(np.sum((self.half[rows] * inner) @ WEIGHTS))
 
 

@@ -2,6 +2,7 @@
 
 import math
 
+import attrs
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -11,7 +12,15 @@ from flocsim.body import Fluid
 from flocsim.brownian import repulsion, splitting_probability, stability_ratio
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.errors import UsageError
-from flocsim.forces import DoubleLayer, OrientedForce, VanDerWaals
+from flocsim.fields import quantity
+from flocsim.forces import (
+    DoubleLayer,
+    Lubrication,
+    OrientedForce,
+    PairResistance,
+    SurfaceForce,
+    VanDerWaals,
+)
 from flocsim.geometry.contact.attraction import attraction_energy
 from flocsim.geometry.contact.charges import layer_energy
 from flocsim.geometry.shapes.pieces import outline_pieces
@@ -158,3 +167,46 @@ def test_what_asks_for_angles_has_no_stability_ratio():
 
     with pytest.raises(UsageError, match="depends on the angles of the bodies"):
         stability_ratio([Dipoles()], SMALL)
+
+
+@attrs.frozen
+class Hamaker(SurfaceForce):
+    """The attraction of two spheres at any gap: Hamaker (1937), Physica 4, 1058."""
+
+    hamaker: float = quantity("J", above=0.0)
+
+    @property
+    def reach(self):
+        return math.inf
+
+    @staticmethod
+    def kernel(pair, hamaker):
+        a, b, gap = pair.radius_i, pair.radius_j, max(pair.gap, 1e-13)
+        s = gap + a + b
+        p, q = gap * (s + a + b), (s - a + b) * (s + a - b)
+        return -hamaker * s / 3.0 * (2.0 * a * b * (1.0 / p**2 + 1.0 / q**2) - 1.0 / p + 1.0 / q)
+
+
+@pytest.mark.parametrize(
+    ("energy", "alone", "in_water"),
+    [(0.1, 1.013, 0.4058), (1.0, 1.059, 0.5250), (10, 1.199, 0.7251)],
+)
+def test_water_slows_down_coagulation(energy, alone, in_water):
+    """By exact resistance functions of two equal spheres."""
+    force = Hamaker(energy * KT)
+    assert 1.0 / stability_ratio([force], (1e-6, 1e-6)) == pytest.approx(alone, abs=1e-3)
+    found = stability_ratio([force, PairResistance(h_min=1e-13)], (1e-6, 1e-6))
+    assert 1.0 / found == pytest.approx(in_water, abs=2e-4)
+
+
+def test_lubrication_alone_is_refused():
+    with pytest.raises(UsageError, match="give PairResistance in the place of Lubrication"):
+        stability_ratio([Lubrication()], (1e-6, 1e-6))
+
+
+@pytest.mark.parametrize("radius", [1e-7, 1e-6, 1e-5])
+@pytest.mark.parametrize("d_min", [1e-9, 1e-12])
+def test_attraction_counts_as_far_as_it_is_felt_at_room_temperature(radius, d_min):
+    """Eq. 5 scales with the radius, whatever d_min; by direct quadrature."""
+    force = VanDerWaals(hamaker=4.7e-20, d_min=d_min, gap="surface")
+    assert stability_ratio([force], (radius, radius)) == pytest.approx(0.54808, abs=2e-5)
