@@ -102,6 +102,15 @@ class Focus:
         return float("inf")
 
 
+def before_filter(softness: float, scale: float) -> float:
+    """Return the softness [px] of an outline before a filter of so many pixels, of at least 1.
+
+    Of two blurs in a row the squares add up. The blur of 1 px of the usual filter stays: limits of
+    softness hold with it.
+    """
+    return float(np.sqrt(max(softness**2 - max(scale, 1.0) ** 2 + 1.0, SPREADS[0] ** 2)))
+
+
 def surroundings(picture: np.ndarray, box: Box, margin: int) -> tuple[np.ndarray, Box]:
     """What a picture has in a box and so many pixels around it, and where the box lies in that."""
     place = clipped(beyond(box, margin), picture.shape)

@@ -13,7 +13,7 @@ import numpy as np
 
 from flocsim.io.images.background import robust_deviation, sampled, stride_of, strips
 from flocsim.io.images.boxes import Box, beyond, clipped, moved, placed, widened
-from flocsim.io.images.focus import Focus, around, rim
+from flocsim.io.images.focus import Focus, around, before_filter, rim
 
 EIGHT = np.ones((3, 3), int)
 """Diagonal pixels belong together."""
@@ -269,6 +269,7 @@ class Search:
             if softness < TOO_SHARP * self.scale:
                 continue
             mean = float(focus.contrast[place][part].mean()) - base
+            softness = before_filter(softness, self.scale)
             outline = Outline(place, part, level, base, softness, mean)
             inside = [] if self.in_focus(outline) else self.inside(focus, outline)
             found += inside or [outline]
@@ -382,6 +383,7 @@ def outlines_at(contrast: np.ndarray, threshold: float, focus: Focus) -> list[Ou
     found = []
     for mask, box in pieces(contrast > threshold, here):
         softness = focus.softness(*widened(filled(mask), box, 1, contrast.shape))
+        softness = before_filter(softness, focus.scale)
         mean = float(contrast[box][mask].mean())
         found.append(Outline(box, mask, threshold, 0.0, softness, mean))
     return found
