@@ -124,3 +124,17 @@ def test_setting_says_how_heavy_the_flocs_of_the_paper_are():
 def test_setting_heeds_values_laid_over_the_config():
     found = setting_of("preset = 'tang2014'", preset="clay", fluid={"temperature": 283.15})
     assert "own for fluid: real weight, water of 10 °C and 35 g/kg of salt, surface" in found
+
+
+@pytest.mark.parametrize(
+    ("potential", "said"),
+    [("0.03", "0.03 V"), ("'30 mV'", "30 mV"), ("['15 mV', '-40 mV']", "15 mV and -40 mV")],
+)
+def test_setting_says_the_potential_of_one_body_or_of_two(potential, said):
+    found = setting_of(f"preset = 'clay'\n[forces.double_layer]\npotential = {potential}")
+    assert f"surface potential {said}, Hamaker" in found
+
+
+@pytest.mark.parametrize("config", ["forces = 1", "fluid = 1", "bodies = 'x'", "preset = ['clay']"])
+def test_setting_of_a_damaged_config_is_a_sentence(config):
+    assert setting_of(config).endswith(".")

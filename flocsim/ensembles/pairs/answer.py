@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.body import Fluid, FractalDensity
-from flocsim.ensembles.config.loader import Reading, lay_over
+from flocsim.ensembles.config.loader import Reading, lay_over, value_at
 from flocsim.ensembles.config.schema import PRESETS, BodiesConfig
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import parse
@@ -21,10 +21,10 @@ MOST_HANGING = 0.005
 """Fraction of the aggregated pairs up to which those that hang are not mentioned."""
 
 SURFACES = (
-    ("double_layer", "potential", "V", "surface potential"),
-    ("van_der_waals", "hamaker", "J", "Hamaker constant"),
+    ("forces.double_layer.potential", "V", "surface potential"),
+    ("forces.van_der_waals.hamaker", "J", "Hamaker constant"),
 )
-"""Force, key, unit and words of what is said of the surfaces."""
+"""Key, unit and words of what is said of the surfaces."""
 
 PHYSICS = ("bodies", "fluid", "forces", "zone")
 """Tables whose values a preset gives."""
@@ -153,7 +153,7 @@ def setting_sentence(results: Results) -> str:
         words += f" with values of its own for {' and '.join(own)}"
     if fluid is not None and bodies is not None:
         water = fluid.words.partition(":")[0] or f"water of {1e3 * fluid.viscosity:.3g} mPa s"
-        known = weight_of(bodies, fluid), water, *surfaces_of(table.get("forces", {}))
+        known = weight_of(bodies, fluid), water, *surfaces_of(table)
         words += f": {', '.join(known)}"
     return f"{words}."
 
@@ -168,9 +168,10 @@ def weight_of(bodies: BodiesConfig, fluid: Fluid) -> str:
     return f"{bodies.surface_density:g} kg/m² of projected area{sunk}"
 
 
-def surfaces_of(forces: Mapping[str, Any]) -> Iterator[str]:
+def surfaces_of(table: Mapping[str, Any]) -> Iterator[str]:
     """Yield the potential and the Hamaker constant of the built-in forces that there are."""
-    for force, key, unit, words in SURFACES:
-        if isinstance(table := forces.get(force), dict) and key in table:
-            value = table[key]
-            yield f"{words} {value}{f' {unit}' * (not isinstance(value, str))}"
+    for key, unit, words in SURFACES:
+        if (value := value_at(table, key)) is not None:
+            both = value if isinstance(value, list) else [value]  # of two unlike bodies
+            given = (each if isinstance(each, str) else f"{each} {unit}" for each in both)
+            yield f"{words} {' and '.join(given)}"
