@@ -19,7 +19,7 @@ from flocsim.io.results.schema import Results
 
 NARROW = 4
 """Labels of vertex counts that fit a panel of three beside each other."""
-HOLLOW = f" Hollow: of fewer than {ends.FEW} pairs; missing: of none."
+HOLLOW = f" Hollow: fewer than {ends.FEW} pairs."
 DELTA_LABEL = r"displacement $\delta\,/\,\delta_{\max}$"
 LABELS = {
     "pr_inside": r"$\Pr[C(d_c<D_0)]$",
