@@ -141,7 +141,7 @@ def test_the_replicate_shown_is_near_the_upper_quartile_of_its_class(made_up):
     times = results.replicates["t_end"] - results.replicates["t_collision"]
     found = instructive_of_each(results)
     assert list(found) == [name for code, name in enumerate("ABCD") if np.any(outcome == code)]
-    for name, (place, why) in found.items():
+    for name, (place, _) in found.items():
         of_class = outcome == OUTCOMES.index(name)
         most = max(v for v in range(len(results.vertices)) if of_class[:, v].any())
         times_there = times[:, most][of_class[:, most]]
