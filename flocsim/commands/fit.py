@@ -205,7 +205,9 @@ def run(args: argparse.Namespace) -> int:
     settings = {
         "method": args.method, "preserve_area": args.preserve_area, "inscribed": args.inscribed,
     }  # fmt: skip
+    read = {picture.path for picture in pictures}
     sizes = [PIXEL_SIZE.warning("the pixel size", picture.pixel_size) for picture in pictures]
+    sizes += [f"{path} was left out" for path in paths if path not in read]
     if doubts := list(dict.fromkeys(filter(None, sizes))):
         settings["warning"] = "; ".join(doubts)
         report(f"warning: {settings['warning']}")

@@ -12,6 +12,7 @@ from flocsim.ensembles.config.schema import PRESETS, BodiesConfig
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.errors import ConfigError
+from flocsim.fields import is_number
 from flocsim.io.results.events import AGGREGATED, HOOK
 from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.run_group import stored
@@ -21,10 +22,11 @@ MOST_HANGING = 0.005
 """Fraction of the aggregated pairs up to which those that hang are not mentioned."""
 
 SURFACES = (
-    ("forces.double_layer.potential", "V", "surface potential"),
-    ("forces.van_der_waals.hamaker", "J", "Hamaker constant"),
+    ("forces.double_layer.potential", 1e3, "mV", "surface potential"),
+    ("forces.double_layer.debye_length", 1e9, "nm", "Debye length"),
+    ("forces.van_der_waals.hamaker", 1.0, "J", "Hamaker constant"),
 )
-"""Key, unit and words of what is said of the surfaces."""
+"""Key, unit over the SI unit, unit and words of what is said of the surfaces."""
 
 PHYSICS = ("bodies", "fluid", "forces", "zone")
 """Tables whose values a preset gives."""
@@ -150,9 +152,10 @@ def setting_sentence(results: Results) -> str:
     bodies = reading.made(BodiesConfig, table.get("bodies", {}), "bodies")
     words = f"Preset {name}" if name else "No preset"
     if name and (own := [each for each in PHYSICS if table.get(each) != preset.get(each)]):
-        words += f" with values of its own for {' and '.join(own)}"
+        words += f" with your values for {' and '.join(own)}"
     if fluid is not None and bodies is not None:
         water = fluid.words.partition(":")[0] or f"water of {1e3 * fluid.viscosity:.3g} mPa s"
+        reading.add_water(table, fluid)
         known = weight_of(bodies, fluid), water, *surfaces_of(table)
         words += f": {', '.join(known)}"
     return f"{words}."
@@ -170,8 +173,10 @@ def weight_of(bodies: BodiesConfig, fluid: Fluid) -> str:
 
 def surfaces_of(table: Mapping[str, Any]) -> Iterator[str]:
     """Yield the potential and the Hamaker constant of the built-in forces that there are."""
-    for key, unit, words in SURFACES:
+    for key, factor, unit, words in SURFACES:
         if (value := value_at(table, key)) is not None:
             both = value if isinstance(value, list) else [value]  # of two unlike bodies
-            given = (each if isinstance(each, str) else f"{each} {unit}" for each in both)
+            given = (
+                f"{factor * each:.3g} {unit}" if is_number(each) else str(each) for each in both
+            )
             yield f"{words} {' and '.join(given)}"
