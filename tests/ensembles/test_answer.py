@@ -106,8 +106,8 @@ def setting_of(config, **overrides):
         (
             "preset = 'si'\n[fluid]\ntemperature = '10 degC'\nionic_strength = '10 mmol/l'",
             "Preset si with your values for fluid and forces: 2650 kg/m³, water of 10 °C and "
-            "an ionic strength of 0.01 mol/l, surface potential 15 mV, Debye length 3.06 nm, Hamaker "
-            "constant 4.7e-20 J.",
+            "an ionic strength of 0.01 mol/l, surface potential 15 mV, Debye length 3.06 nm, "
+            "Hamaker constant 4.7e-20 J.",
         ),
         ("not TOML", ""),
     ],
