@@ -104,7 +104,7 @@ def draw(found, times, radii, volume, path):
 
     # A column of a journal, 3.4 inches.
     plt.rcParams.update({"font.size": 7, "axes.linewidth": 0.6, "lines.linewidth": 1.0})
-    figure, (left, right) = plt.subplots(1, 2, figsize=(3.4, 1.7), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(3.4, 1.9), layout="constrained")
     colours = ("#0072B2", "#D55E00")
     middle = len(times) // 3
     for number, (label, n) in enumerate(found):
@@ -113,7 +113,7 @@ def draw(found, times, radii, volume, path):
         places = np.arange(len(radii)) + 0.4 * (number - 0.5)
         right.bar(places, share, 0.38, color=colours[number])
     left.set_xlabel("time [min]")
-    left.set_ylabel("volume-mean radius [µm]")
+    left.set_ylabel("volume-mean\nradius [µm]")
     figure.legend(frameon=False, loc="outside lower center", ncols=2)
     right.set_xticks(np.arange(len(radii)), [f"{1e6 * r:.3g}" for r in radii])
     right.set_xlabel("radius of size class [µm]")
