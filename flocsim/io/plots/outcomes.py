@@ -327,7 +327,8 @@ def shape_effects(results: Results) -> Figure:
             for axes in row:
                 style.set_probability_axis(axes)
                 axes.locator_params(axis="x", nbins=2)
-                axes.xaxis.set_major_formatter("{x:g}")
+                # Three labels fit without the zero before the point.
+                axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}".lstrip("0"))
             row[0].set_ylabel(title)
             if not rows:
                 style.note(row[0], "only for\nfinished\nstudies")
@@ -356,7 +357,7 @@ def draw_effect(axes, effect):
     measure, known = effect.measure, effect.measure.size
     for index, (name, colour) in enumerate(style.CLASS_COLOURS.items()):
         if known:
-            look = {"color": colour, "marker": style.MARKERS[1 + index]}
+            look = {"color": colour, "marker": style.MARKERS[1 + index], "clip_on": False}
             axes.plot(measure, effect.pr_class[0, index], lw=0.9, ms=2.5, label=name, **look)
     value, low, high = effect.pr_a if known else np.empty((3, 0))
     reach = np.clip([value - low, high - value], 0.0, None)
