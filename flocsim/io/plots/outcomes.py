@@ -327,8 +327,7 @@ def shape_effects(results: Results) -> Figure:
             for axes in row:
                 style.set_probability_axis(axes)
                 axes.locator_params(axis="x", nbins=2)
-                # Three labels fit without the zero before the point.
-                axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}".lstrip("0"))
+                axes.xaxis.set_major_formatter("{x:g}")
             row[0].set_ylabel(title)
             if not rows:
                 style.note(row[0], "only for\nfinished\nstudies")
