@@ -85,7 +85,7 @@ def draw(rows, varied, path, foot):
     panels = list(dict.fromkeys(row[:2] for row in rows))
     several = len({vertices for _, vertices in panels}) > 1
     titles = [f"{preset}, $N$ = {n}" if several else preset for preset, n in panels]
-    hollow = {"marker": "o", "ls": "", "mfc": "none", "ms": 5.5}
+    hollow = {"marker": "o", "ls": "", "mfc": "none", "ms": 5.5, "clip_on": False}
     with panel_grid(titles, r"$\Pr[A]$", label) as (figure, all_axes, spare):
         for axes, panel in zip(all_axes, panels, strict=True):
             for k, (law, colour) in enumerate(zip(LAWS, BODY_COLOURS, strict=False)):
@@ -93,7 +93,7 @@ def draw(rows, varied, path, foot):
                 apart = 1.0 + (0.15 if varied == "hamaker" else 0.012) * k
                 x = [unit * row[3] * apart for row in here]
                 p, low, high = np.array([aggregated(row[4]) for row in here]).T
-                look = {"color": colour, "marker": marker(k), "elinewidth": 0.8}
+                look = {"color": colour, "marker": marker(k), "elinewidth": 0.8, "clip_on": False}
                 axes.errorbar(x, p, np.clip([p - low, high - p], 0.0, None), **look)
                 both = [aggregated(row[4], "held")[0] for row in here]
                 axes.plot(x, both, color=colour, **hollow)
