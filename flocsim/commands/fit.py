@@ -205,9 +205,7 @@ def run(args: argparse.Namespace) -> int:
     settings = {
         "method": args.method, "preserve_area": args.preserve_area, "inscribed": args.inscribed,
     }  # fmt: skip
-    read = {picture.path for picture in pictures}
     sizes = [PIXEL_SIZE.warning("the pixel size", picture.pixel_size) for picture in pictures]
-    sizes += [f"{path} was left out" for path in paths if path not in read]
     if doubts := list(dict.fromkeys(filter(None, sizes))):
         settings["warning"] = "; ".join(doubts)
         report(f"warning: {settings['warning']}")
@@ -222,7 +220,9 @@ def run(args: argparse.Namespace) -> int:
     print("\n".join([format_errors(entries), *population_lines(entries)]))
     counts = ", ".join(map(str, args.vertices))
     flocs = plural(len(entries) // len(args.radii), "floc")
-    print(f"{args.output}: {flocs} at N = {counts}; {table}: all regions")
+    left = [str(path) for path in paths if path not in {picture.path for picture in pictures}]
+    end = f"; left out: {', '.join(left)}" if left else ""
+    print(f"{args.output}: {flocs} at N = {counts}; {table}: all regions{end}")
 
     # A file may hold several pictures, which have names of their own.
     labels = label_files(args.masks_out, [each.name for each in pictures])

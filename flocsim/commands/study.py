@@ -175,8 +175,8 @@ def make_study(args: Namespace) -> int:
             found = kind.read(file)
             print("", kind.setting(found), kind.answer(found), sep="\n")
         print(f"\nall on one page: {folder.path / REPORT}")
-        print(f"check the outlines, and leave out flocs, on {folder.path / 'shapes-review.html'}; "
-              "then add --reviewed FILE --overwrite")  # fmt: skip
+        review = folder.path / "shapes-review.html"
+        print(f"choose flocs by eye on {review}; then add --reviewed FILE --overwrite")
     return code
 
 

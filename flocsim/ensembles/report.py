@@ -305,8 +305,8 @@ def numerics_line(results: Results) -> str:
     errors = table["pr_a_numerical"][events_of(table)["pr_a"].trials >= ENOUGH]
     if not np.isfinite(errors).any():
         return f"{line}."
-    where = f"any condition with {ENOUGH} collisions or more"
-    return f"{line}; Pr[A] is uncertain by at most ±{np.nanmax(errors):.3f} in {where} (95 %)."
+    most = f"at most ±{np.nanmax(errors):.3f} wherever {ENOUGH} pairs or more touched (95 %)"
+    return f"{line}; Pr[A] is uncertain by {most}."
 
 
 def outlines_line(results: Results) -> str:
