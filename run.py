@@ -137,6 +137,7 @@ def main(arguments):
         return demo()
     install("mpi", "test", "dev")
     if command != "test":
+        print("flocsim is installed: try " + tool("flocsim") + " --help, or go on with README.md")
         return 0
     add("docs")
     add("formats")

@@ -102,7 +102,9 @@ def draw(found, times, radii, volume, path):
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(7.4, 2.8), layout="constrained")
+    # A column of a journal, 3.4 inches.
+    plt.rcParams.update({"font.size": 7, "axes.linewidth": 0.6, "lines.linewidth": 1.0})
+    figure, (left, right) = plt.subplots(1, 2, figsize=(3.4, 1.9), layout="constrained")
     colours = ("#0072B2", "#D55E00")
     middle = len(times) // 3
     for number, (label, n) in enumerate(found):
@@ -111,15 +113,15 @@ def draw(found, times, radii, volume, path):
         places = np.arange(len(radii)) + 0.4 * (number - 0.5)
         right.bar(places, share, 0.38, color=colours[number])
     left.set_xlabel("time [min]")
-    left.set_ylabel("volume-mean radius [µm]")
-    left.legend(frameon=False)
+    left.set_ylabel("volume-mean\nradius [µm]")
+    figure.legend(frameon=False, loc="outside lower center", ncols=2)
     right.set_xticks(np.arange(len(radii)), [f"{1e6 * r:.3g}" for r in radii])
-    right.set_xlabel("size class, radius [µm]")
-    right.set_ylabel(f"share of the volume\nafter {times[middle] / 60.0:.2g} min")
+    right.set_xlabel("radius of size class [µm]")
+    right.set_ylabel(f"fraction of volume\nafter {times[middle] / 60.0:.2g} min")
     for axes in (left, right):
         axes.spines[["top", "right"]].set_visible(False)
         axes.set_ylim(bottom=0.0)
-    figure.savefig(path, dpi=200, metadata={"Software": None})
+    figure.savefig(path, dpi=400, metadata={"Software": None})
     print(path)
 
 

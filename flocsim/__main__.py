@@ -1,8 +1,13 @@
 """The command `flocsim`, also `python -m flocsim`: one subcommand for each thing to do."""
 
 import argparse
+import signal
 import sys
 from collections.abc import Sequence
+
+# Ctrl-C while modules are loaded ends the process without a traceback.
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 from flocsim import __version__
 from flocsim.commands import STUDIES, SUMMARIES, add_command
@@ -18,6 +23,9 @@ from flocsim.ensembles.cli import silent_unless_first
 from flocsim.ensembles.parallel.processes import launched_rank, launched_size
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.arguments import Parser
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 STARTERS = ("study", "sweep")
 """Commands that start processes of their own, which would meet those of a launcher."""

@@ -20,11 +20,21 @@ from pathlib import Path
 
 import numpy as np
 
+import flocsim
 from benchmarks.reporting import EXAMPLES, Table, begin
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.runner import run
 from flocsim.io.confidence import wilson
-from flocsim.io.plots.style import house_style, new_figure, save, set_probability_axis
+from flocsim.io.plots.style import (
+    BODY_COLOURS,
+    add_foot,
+    line_handles,
+    marker,
+    panel_grid,
+    place_legend,
+    save,
+    set_probability_axis,
+)
 from flocsim.io.results.schema import OUTCOMES
 
 PRESETS = ("tang2014", "clay")
@@ -67,34 +77,34 @@ def aggregated(counts, *more):
     return found / max(known, 1), float(low), float(high)
 
 
-def draw(rows, varied, path):
-    """Both laws of each preset and N beside each other."""
+def draw(rows, varied, path, foot):
+    """Both laws of each preset and N, a panel for each."""
+    from matplotlib.lines import Line2D
+
     _, label, unit = VARIED[varied]
     panels = list(dict.fromkeys(row[:2] for row in rows))
     several = len({vertices for _, vertices in panels}) > 1
-    with house_style():
-        figure = new_figure(1.0 + 2.75 * len(panels), 3.0)
-        all_axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    titles = [f"{preset}, $N$ = {n}" if several else preset for preset, n in panels]
+    hollow = {"marker": "o", "ls": "", "mfc": "none", "ms": 5.5, "clip_on": False}
+    with panel_grid(titles, r"$\Pr[A]$", label) as (figure, all_axes, spare):
         for axes, panel in zip(all_axes, panels, strict=True):
-            for k, law in enumerate(LAWS):
+            for k, (law, colour) in enumerate(zip(LAWS, BODY_COLOURS, strict=False)):
                 here = [row for row in rows if row[:3] == (*panel, law)]
                 apart = 1.0 + (0.15 if varied == "hamaker" else 0.012) * k
                 x = [unit * row[3] * apart for row in here]
                 p, low, high = np.array([aggregated(row[4]) for row in here]).T
-                ends = [p - low, high - p]
-                line = axes.errorbar(x, p, yerr=ends, marker="o", capsize=2, label=law)
+                look = {"color": colour, "marker": marker(k), "elinewidth": 0.8, "clip_on": False}
+                axes.errorbar(x, p, np.clip([p - low, high - p], 0.0, None), **look)
                 both = [aggregated(row[4], "held")[0] for row in here]
-                axes.plot(x, both, "o", mfc="none", ms=8, color=line[0].get_color())
+                axes.plot(x, both, color=colour, **hollow)
             set_probability_axis(axes)
-            title = f"{panel[0]}, N = {panel[1]}" if several else panel[0]
-            axes.set(xlabel=label, title=title)
             if varied == "hamaker":
                 axes.set_xscale("log")
-        all_axes[0].plot([], [], "o", mfc="none", ms=8, color="grey", label="or held apart")
-        all_axes[0].set_ylabel("Pr[A]")
-        side = "center right" if varied == "hamaker" else "lower left"
-        all_axes[0].legend(title="forces by", loc=side)
-        save(figure, path)
+        handles = line_handles(LAWS, BODY_COLOURS)
+        handles.append(Line2D([], [], color="grey", label="or held apart", **hollow))
+        place_legend(figure, {"forces by": handles}, spare)
+        add_foot(figure, "Bars: 95 % sampling intervals.")
+        save(figure, path, foot=foot)
 
 
 def main():
@@ -118,7 +128,8 @@ def main():
         table.add(*case[:3], f"{unit * case[3]:.3g}", p, interval, *counts.values(), spent)
     table.print()
     if args.figure:
-        draw(rows, varied, args.figure)
+        words = f"type {args.type}, δ = 0.5 · grown flocs · n = {args.replicates}"
+        draw(rows, varied, args.figure, f"{words} · flocsim {flocsim.__version__}")
 
 
 if __name__ == "__main__":

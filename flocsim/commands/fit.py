@@ -220,7 +220,9 @@ def run(args: argparse.Namespace) -> int:
     print("\n".join([format_errors(entries), *population_lines(entries)]))
     counts = ", ".join(map(str, args.vertices))
     flocs = plural(len(entries) // len(args.radii), "floc")
-    print(f"{args.output}: {flocs} at N = {counts}; {table}: all regions")
+    left = [str(path) for path in paths if path not in {picture.path for picture in pictures}]
+    end = f"; left out: {', '.join(left)}" if left else ""
+    print(f"{args.output}: {flocs} at N = {counts}; {table}: all regions{end}")
 
     # A file may hold several pictures, which have names of their own.
     labels = label_files(args.masks_out, [each.name for each in pictures])

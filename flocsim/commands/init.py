@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
@@ -91,5 +92,5 @@ def run(args: Namespace) -> int:
         write_file(each, content.encode(), rule)
     wrote = " and ".join(map(str, files))
     command = COMMANDS.get(args.kind, "ensemble")
-    print(f"wrote {wrote}{source}; run it with: flocsim {command} {args.file}")
+    print(f"wrote {wrote}{source}; run it with: flocsim {command} {shlex.quote(args.file)}")
     return 0

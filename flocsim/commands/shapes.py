@@ -18,7 +18,7 @@ from flocsim.ensembles.contents import Contents, Figures, Summary
 from flocsim.errors import UsageError, plural
 from flocsim.hydrodynamics import prism_drag
 from flocsim.io.arguments import document, number
-from flocsim.io.fit_report import format_errors, measures_in, population_lines
+from flocsim.io.fit_report import format_errors, measures_in, one_each, population_lines
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import check_outputs
 from flocsim.io.plots.shapes import POPULATION_FIGURES
@@ -268,8 +268,8 @@ class LibraryFiles(Contents):
 
     def source(self, found: Library) -> str:
         """Return of how many flocs and pictures it is."""
-        images = {each.image for each in found.entries}
-        return f"{plural(len(found.entries), 'floc')} of {plural(len(images), 'picture')}"
+        flocs, images = one_each(found.entries), {each.image for each in found.entries}
+        return f"{plural(len(flocs), 'floc')} of {plural(len(images), 'picture')}"
 
 
 LIBRARY = LibraryFiles()

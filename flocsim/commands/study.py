@@ -28,6 +28,7 @@ from flocsim.ensembles.contents import open_kind
 from flocsim.errors import FileError, UsageError
 from flocsim.io.arguments import whole
 from flocsim.io.files import make_folder, write_file
+from flocsim.io.images.review import checksum_of
 from flocsim.io.journal import Lock
 from flocsim.io.json_text import read_json
 from flocsim.io.seals import held, sha256_of
@@ -63,6 +64,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     --output FOLDER: folder to make, and to go on in (default: %(default)s)
     --replicates K: pairs in each condition (default: as the configs say, 100)
     --preset: preset to run; may be repeated (default: clay and tang2014)
+    --reviewed FILE: leave out flocs, as chosen on the page shapes-review.html of the folder
     --fit OPTIONS: further options of flocsim fit, as --fit='--flocs bright --neck 0'
     --jobs K: number of processes (default: one for each core, here %(default)s)
     --overwrite: make anew what other pictures, or another config, have given; each old file is
@@ -75,6 +77,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add("-o", "--output", default="study")
     add("--replicates", type=whole)
     add("--preset", action="append", choices=KINDS)
+    add("--reviewed")
     add("--fit", type=shlex.split, default=[])
     add("--jobs", type=whole, default=len(affinity(0)) if affinity else os.cpu_count() or 1)
     add_settings(parser)
@@ -163,7 +166,8 @@ def make_study(args: Namespace) -> int:
     with open_folder(Path(args.output)) as folder:
         fit_shapes(args, pictures, folder)
         code = max(run_preset(args, preset, folder) for preset in presets)
-        results = [folder.path / f"{preset}.h5" for preset in presets]
+        every = [folder.path / f"{preset}.h5" for preset in dict.fromkeys([*presets, *KINDS])]
+        results = [path for path in every if path.exists()]
         words = ["report", *map(str, results), "-o", str(folder.path / REPORT)]
         folder.make(REPORT, *words, *["--overwrite"] * args.overwrite, of=results)
         for path in results:
@@ -171,7 +175,8 @@ def make_study(args: Namespace) -> int:
             found = kind.read(file)
             print("", kind.setting(found), kind.answer(found), sep="\n")
         print(f"\nall on one page: {folder.path / REPORT}")
-        print(f"check the outlines, and leave out flocs, on {folder.path / 'shapes-review.html'}")
+        review = folder.path / "shapes-review.html"
+        print(f"choose flocs by eye on {review}; then add --reviewed FILE --overwrite")
     return code
 
 
@@ -205,16 +210,18 @@ def fit_shapes(args: Namespace, pictures: Sequence[Path], folder: StudyFolder) -
     source = {
         "pictures": sorted([path.name, sha256_of(path)] for path in pictures),
         "pixel_size": args.pixel_size,
-        "options": [[word, sha256_of(word) if os.path.isfile(word) else ""] for word in args.fit],
+        "options": args.fit,
+        "choices": None if args.reviewed is None else checksum_of(Path(args.reviewed)),
     }
     shapes, before = folder.path / "shapes.h5", folder.record["source"]
     if shapes.exists() and before == source:
         print(f"{shapes} has the flocs of these pictures")
         return
+    changed = [name.replace("_", " ") for name, of in source.items() if before.get(name) != of]
     if shapes.exists() and before and not args.overwrite:
         raise UsageError(
-            f"{shapes} was made of other pictures, with another pixel size or other options: name "
-            "another folder by -o, or add --overwrite, which keeps the old file under another name"
+            f"{shapes} was made from other {' and '.join(changed)}: name another folder by -o, or "
+            "add --overwrite, which keeps the old file under another name"
         )
     # Without a source the shapes of a process that is killed now are not taken for the new ones.
     folder.record["source"] = {}
@@ -222,8 +229,10 @@ def fit_shapes(args: Namespace, pictures: Sequence[Path], folder: StudyFolder) -
     words = ["fit", *args.images, *args.fit]
     words += ["--pixel-size", repr(args.pixel_size)] * (args.pixel_size is not None)
     words += ["--vertices", "4,16,64", "--radius", "1", "--jobs", str(args.jobs)]
+    words += ["--reviewed", args.reviewed] if args.reviewed is not None else []
     words += ["-o", str(shapes), "--review"]
-    call(*words, *["--overwrite"] * shapes.exists())
+    # Files of a fit that found nothing, or was stopped, are kept under other names.
+    call(*words, *["--overwrite"] * any(folder.path.glob("shapes*")))
     folder.record["source"] = source
     folder.save()
 

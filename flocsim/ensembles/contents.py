@@ -433,11 +433,8 @@ class Differences(Tables):
         if known and np.isfinite(error).any():
             most = f"±{np.nanmax(error):.3f} at most in any condition (95 %)"
             lines.append(f"Numerical error: exact runs would change a difference by {most}.")
-        stars = f"{sum(cells[-1] == '*' for cells in rows)} of {len(rows) - 1}"
-        lines.append(
-            f"{stars} differences are significant (*): their interval, numerical error included, "
-            "does not contain 0. By chance 1 in 20 would be."
-        )
+        stars = f"{sum(cells[-1] == '*' for cells in rows)} of {len(rows) - 1} differences"
+        lines.append(f"{stars} are significant (*), numerical error included; by chance 1 in 20.")
         return "\n".join(lines)
 
     def interval(self, at: Mapping[str, float]) -> str:

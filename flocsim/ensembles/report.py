@@ -7,7 +7,7 @@ import numpy as np
 
 from flocsim.errors import FlocsimError
 from flocsim.io.confidence import efficiency, wilson
-from flocsim.io.results.events import HOOK, MOST_UNKNOWN
+from flocsim.io.results.events import HOOK, MOST_UNKNOWN, events_of
 from flocsim.io.results.kernel_group import ESTIMATES, Kernel
 from flocsim.io.results.run_group import describe_note, stored
 from flocsim.io.results.schema import CLASSES, Results
@@ -19,6 +19,9 @@ OTHER = ("missed", "held", "undecided", "failed")
 
 FURTHER = ("collided", "inside", *OTHER)
 """Counts that have columns of their own only where all are asked for."""
+
+ENOUGH = 10
+"""Collisions of a condition from which its numerical error counts for the whole study."""
 
 LEGEND = (
     "A, B: contact inside the zone, then stick, part; C, D: the same outside; Pr[A]: A + C of all.",
@@ -297,12 +300,13 @@ def numerics_line(results: Results) -> str:
     checked, flipped = (int(table[name].sum()) for name in ("n_checked", "n_flipped"))
     if not checked:
         return "Numerical error: not known, as no replicate was run again."
-    runs = "none of" if not flipped else f"{flipped} of"
-    most = np.nanmax(table["pr_a_numerical"], initial=0.0)
-    return (
-        f"Numerical error: {runs} {checked} re-runs changed its outcome; Pr[A] is uncertain by at "
-        f"most ±{most:.3f} in any condition (95 %)."
-    )
+    line = f"Numerical error: {flipped or 'none'} of {checked} re-runs changed its outcome"
+    # A single flip counts much where hardly any pair touched.
+    errors = table["pr_a_numerical"][events_of(table)["pr_a"].trials >= ENOUGH]
+    if not np.isfinite(errors).any():
+        return f"{line}."
+    most = f"at most ±{np.nanmax(errors):.3f} wherever {ENOUGH} pairs or more touched (95 %)"
+    return f"{line}; Pr[A] is uncertain by {most}."
 
 
 def outlines_line(results: Results) -> str:

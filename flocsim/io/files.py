@@ -81,9 +81,8 @@ def make_folder(path: str | os.PathLike, option: str = "") -> None:
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileError(
-            f"{option}{path} could not be made: {error.strerror}; name another folder"
-        ) from error
+        why = "it is a file" if Path(path).is_file() else error.strerror
+        raise FileError(f"{option}{path} could not be made: {why}; name another folder") from error
 
 
 def fresh_beside(target: Path) -> Path:

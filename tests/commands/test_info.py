@@ -43,7 +43,7 @@ def test_strengths_are_told_and_whether_they_are_complete(tmp_path, complete):
 def test_flocs_of_a_library_are_known_in_water(capsys):
     assert main(["info", str(SHIPPED), "--water"]) == 0
     heading, columns, *rows = capsys.readouterr().out.splitlines()
-    assert "prisms of 24 outlines" in heading and columns.split()[:2] == ["floc", "sinks"]
+    assert "24 flocs, as prisms" in heading and columns.split()[:2] == ["floc", "sinks"]
     assert len(rows) == 24
     most, least, turns, b, error = (float(each) for each in rows[0].split()[1:])
     assert 0.6 < least <= most < 1.0 and 0.1 < turns < most and 0.0 <= b < 1.0 and error < 30.0

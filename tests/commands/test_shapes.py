@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from flocsim.__main__ import main
+from flocsim.commands.shapes import LIBRARY, Library
 from flocsim.geometry.shapes.cores import Part
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.shape_library import (
@@ -99,6 +100,11 @@ def test_a_name_stands_for_all_spheroradii_of_a_floc(libraries):
     assert names("s.h5") == ["a.png#1 r=1", "a.png#1 r=2"]
     assert main(["shapes", "select", "r.h5", "--drop", "a.png#1 r=2", "-o", "t.h5"]) == 0
     assert names("t.h5") == ["a.png#1 r=1", "a.png#2 r=1", "a.png#2 r=2"]
+
+
+def test_figures_count_a_floc_of_several_spheroradii_once(in_tmp):
+    fits = [entry(f"a.png#{k} r={r}", 9.0, 1e-6, r) for k in (1, 2) for r in (1, 2)]
+    assert LIBRARY.source(Library(fits, {})) == "2 flocs of 1 picture"
 
 
 def test_merged_flocs_keep_sizes_and_get_names_of_their_own(libraries, capsys):

@@ -49,8 +49,10 @@ def test_study_ends_with_an_answer(picture, capfd):
     *_, setting, answer, _, page, review, _ = told.split("\n")
     assert setting.startswith("Preset clay: real weight, water of 15 °C and 35 g/kg of salt, ")
     assert answer.startswith("Of pairs of spheres that touch, 100 % [")
-    for line in (page, review):
-        assert (picture / line.split()[-1]).exists()
+    assert page == "all on one page: mine/report.html"
+    assert review.startswith("choose flocs by eye on mine/shapes-review.html; then add --reviewed")
+    assert (picture / "mine/report.html").exists()
+    assert (picture / "mine/shapes-review.html").exists()
 
 
 @pytest.mark.slow
@@ -72,7 +74,7 @@ def test_second_call_does_what_is_missing_and_leaves_what_is_not_its_own(picture
 def test_files_that_others_have_changed_are_replaced_only_when_asked_for(picture, capfd):
     assert study() == 0
     assert study("--pixel-size", "2e-6") == 2
-    assert "mine/shapes.h5 was made of other pictures" in capfd.readouterr().err
+    assert "mine/shapes.h5 was made from other pixel size: name another" in capfd.readouterr().err
     (picture / "mine/report.html").write_text("mine")
     assert study("--replicates", "2") == 2
     assert "mine/report.html already exists" in capfd.readouterr().err

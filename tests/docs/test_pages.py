@@ -42,8 +42,9 @@ NOT_RUN = {
 }
 """Pages whose commands are parsed only, and why."""
 
-LONG = ("settling_kernel", "settling_swarm")
-"""Words of further commands that are parsed only: they take a quarter of an hour."""
+LONG = ("settling_kernel", "settling_swarm", "--reviewed")
+"""Words of further commands that are parsed only: they take a quarter of an hour, or a file that
+the page of --review saves."""
 
 GIVEN = {
     "README.md": ["frames"],
@@ -52,6 +53,7 @@ GIVEN = {
     "docs/images.md": ["frames", "masks", "monday.h5"],
     "docs/own_integrator.md": ["modules"],
     "docs/results.md": ["study.h5"],
+    "docs/study.md": ["frames"],
 }
 """What a page takes for granted in the reader's folder."""
 

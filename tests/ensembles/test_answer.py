@@ -96,17 +96,18 @@ def setting_of(config, **overrides):
         (
             "preset = 'clay'",
             "Preset clay: real weight, water of 15 °C and 35 g/kg of salt, surface potential "
-            "15 mV, Hamaker constant 2e-20 J.",
+            "15 mV, Debye length 0.335 nm, Hamaker constant 2e-20 J.",
         ),
         (
             "preset = 'clay'\n[fluid]\nsalinity = 5.0",
-            "Preset clay with values of its own for fluid: real weight, water of 15 °C and 5 g/kg "
-            "of salt, surface potential 15 mV, Hamaker constant 2e-20 J.",
+            "Preset clay with your values for fluid: real weight, water of 15 °C and 5 g/kg "
+            "of salt, surface potential 15 mV, Debye length 0.956 nm, Hamaker constant 2e-20 J.",
         ),
         (
             "preset = 'si'\n[fluid]\ntemperature = '10 degC'\nionic_strength = '10 mmol/l'",
-            "Preset si with values of its own for fluid and forces: 2650 kg/m³, water of 10 °C and "
-            "an ionic strength of 0.01 mol/l, surface potential 15 mV, Hamaker constant 4.7e-20 J.",
+            "Preset si with your values for fluid and forces: 2650 kg/m³, water of 10 °C and "
+            "an ionic strength of 0.01 mol/l, surface potential 15 mV, Debye length 3.06 nm, "
+            "Hamaker constant 4.7e-20 J.",
         ),
         ("not TOML", ""),
     ],
@@ -123,4 +124,20 @@ def test_setting_says_how_heavy_the_flocs_of_the_paper_are():
 
 def test_setting_heeds_values_laid_over_the_config():
     found = setting_of("preset = 'tang2014'", preset="clay", fluid={"temperature": 283.15})
-    assert "own for fluid: real weight, water of 10 °C and 35 g/kg of salt, surface" in found
+    assert (
+        "your values for fluid: real weight, water of 10 °C and 35 g/kg of salt, surface" in found
+    )
+
+
+@pytest.mark.parametrize(
+    ("potential", "said"),
+    [("0.03", "30 mV"), ("'30 mV'", "30 mV"), ("['15 mV', '-40 mV']", "15 mV and -40 mV")],
+)
+def test_setting_says_the_potential_of_one_body_or_of_two(potential, said):
+    found = setting_of(f"preset = 'clay'\n[forces.double_layer]\npotential = {potential}")
+    assert f"surface potential {said}, Debye" in found
+
+
+@pytest.mark.parametrize("config", ["forces = 1", "fluid = 1", "bodies = 'x'", "preset = ['clay']"])
+def test_setting_of_a_damaged_config_is_a_sentence(config):
+    assert setting_of(config).endswith(".")

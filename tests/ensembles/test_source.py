@@ -5,9 +5,10 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.loader import load_any_config, load_config
 from flocsim.ensembles.config.schema import ShapesConfig
 from flocsim.ensembles.study import Study
+from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import add_foot, keep_titles_whole
 from flocsim.io.shape_library import SHIPPED
@@ -15,6 +16,11 @@ from tests.helpers.small_study import run_command, write_small, write_star_libra
 from tests.helpers.synthetic_results import make_results
 
 SOURCE = f"preset tang2014 · 3 flocs of stars.h5, resized · n = 3 · flocsim {flocsim.__version__}"
+SWARM = """preset = "si"
+scene = {kind = "swarm", number = 3, area_fraction = 0.05, duration = "1 ms"}
+shapes = {source = "library", file = "stars.h5", vertices = [4]}
+forces.van_der_waals.cut = "1 um"
+"""
 POOL = '3\nsource = "library"\nfile = "stars.h5"'
 
 
@@ -31,6 +37,14 @@ POOL = '3\nsource = "library"\nfile = "stars.h5"'
 )  # fmt: skip
 def test_flocs_in_words(keys, count, words):
     assert ShapesConfig(**keys).described(count) == words
+
+
+def test_flocs_of_a_swarm_are_resized_only_to_a_given_radius(in_tmp):
+    write_star_library(in_tmp / "stars.h5")
+    (in_tmp / "swarm.toml").write_text(SWARM)
+    for scene, words in (({}, ""), ({"radius": 5e-6}, ", resized")):
+        config = load_any_config(in_tmp / "swarm.toml", {"scene": scene})
+        assert SwarmStudy(config).flocs_in_words == f"3 flocs of stars.h5{words}"
 
 
 def test_flocs_that_are_never_drawn_are_not_counted_as_used(in_tmp):

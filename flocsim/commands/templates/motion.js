@@ -71,7 +71,6 @@ function graph(data, panel) {
   if (data.zone !== null) {
     const level = Y(data.zone);
     svg('rect', {x: left, y: level, width: right - left, height: bottom - level, class: 'zone'}, root);
-    svg('path', {d: `M${left},${level}H${right}`, class: 'edge'}, root);
     write(`D₀ = ${data.zone.toPrecision(4)} µm`, right, level - 4, 'end');
   }
   for (const [from, to, across] of [[times[0], times.at(-1), true], [low, high, false]]) {

@@ -179,9 +179,9 @@ class ShapesConfig:
         """The source, or the name of the user's own class."""
         return self.source or own_classes.full_name(self.own)
 
-    def described(self, count: int, drawn: int | None = None) -> str:
+    def described(self, count: int, drawn: int | None = None, measured: bool = False) -> str:
         """Return which flocs a study takes; ``count`` of them, none where all are spheres, of which
-        so many are ``drawn``, all by default."""
+        so many are ``drawn``, all by default; ``measured`` ones keep their sizes."""
         if self.own is not None or not count:
             return self.label if self.own is not None else "spheres"
         if self.file is None:
@@ -189,7 +189,7 @@ class ShapesConfig:
         if Path(self.file) == SHIPPED:
             return f"{count} synthetic flocs included in flocsim"
         some = f"{drawn} of " * (drawn is not None and drawn < count)
-        resized = ", resized" * (self.size == "scene")
+        resized = ", resized" * (self.size == "scene" and not measured)
         return f"{some}{count} flocs of {Path(self.file).name}{resized}"
 
 

@@ -1,17 +1,22 @@
-"""The numerical error of probabilities: what changes where a share of replicates is run again.
+"""The numerical error of probabilities, estimated from replicates that are run again.
 
-A replicate run again at a tighter tolerance has *flipped*, for one probability, if it is counted
-otherwise: as a success, as a failure, or not at all. It has then raised the probability, *gained*,
-or lowered it, *lost*. A share of second runs is run a third time, tighter still: an outcome may lie
-on a plateau, the same at the first two tolerances and another one at the third.
+A fraction of the replicates is run a second time at a tighter tolerance. For one probability, a
+replicate *flips* if the second run counts differently: as a success, as a failure, or not at all.
+It then raises the probability (*gained*) or lowers it (*lost*). Some second runs are followed by a
+third one, tighter still, because an outcome may be the same at two tolerances and differ at the
+third.
 
-Where all were run exactly, S of M would be S' of M'. What was run again is known: S' and M' by the
-most exact run of each of these alone make the one part of the change. Of the others so many may
-gain, and so many lose, as `further_flips` says from what did of the same kind
-(`io.results.events.KINDS`) between first and second runs; and of all that were not run a third
-time, as it says from what changed between second and third ones. What these parts come to together
-is said by `flips_together`. Each flip counts at most 1/M: the interval of the change goes from the
-first part less what may be lost to the first part and what may be gained.
+The change that exact runs would make to S successes of M trials has two parts:
+
+1. The known part: S' of M', with the most exact run of each replicate that was run again.
+2. A bound for flips that nobody has seen. `further_flips` predicts, from first and second runs of
+   the same kind of outcome (`io.results.events.KINDS`), how many of the replicates without a second
+   run would flip; `further_of_all` predicts, from second and third runs, how many of those without
+   a third run would. `flips_together` adds these bounds. A flip changes the probability by at most
+   1/M.
+
+The interval of the change is the known part, minus what may be lost, to the known part, plus what
+may be gained.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -42,7 +47,7 @@ not run is NOT_APPLICABLE."""
 
 
 def run_so(codes: Codes) -> np.ndarray:
-    """Return flags of the replicates that were run."""
+    """Return True for each replicate that was run."""
     return codes[0] != NOT_APPLICABLE
 
 
@@ -139,7 +144,7 @@ def count_changes(
 
 
 def further(of_kinds: np.ndarray, counts: np.ndarray) -> list[np.ndarray]:
-    """Return [how many more gain at most, and lose] of kind_changes and kind_counts (…).
+    """Return bounds [of further gains, of further losses] from kind_changes and kind_counts (…).
 
     Without any third run second ones are taken for exact. NaN where no replicate was run again.
     """
@@ -243,9 +248,9 @@ def further_flips(
     others, u, may flip (``exposed``, need not be whole). NaN where nothing was checked anywhere.
 
     Rates of flips scatter over conditions by a gamma distribution of shape k and mean m, of which
-    k in SHAPES and m in MEANS (before anything is seen as the square root of m, per log m) are
-    weighed by the flips of all conditions. So where flips sit in few conditions a condition in
-    which few were run again is in doubt, and where all are alike it borrows from the others.
+    k in SHAPES and m in MEANS (prior density √m per log m) are weighed by the flips of all
+    conditions. So if flips are concentrated in few conditions, the rate of a condition with few
+    re-runs is uncertain; if all conditions are alike, it is inferred from the others.
     """
     f, c, u = np.broadcast_arrays(
         *(np.asarray(each, float) for each in (flipped, checked, exposed))
@@ -317,12 +322,11 @@ def predicted(
 
 
 def flips_together(parts: ArrayLike, confidence: float = EACH_SIDE) -> np.ndarray:
-    """Return how many more flip at most, with this probability, of independent parts (part, 3, …).
+    """Return the bound of the sum of independent numbers of flips (part, 3, …).
 
-    With means µ and bounds q of the parts, each at the same probability,
-    Σ µ + √(Σ (q − µ)²), upwards to a whole number; 0 where all parts together are so likely to
-    have none. One part keeps its bound. Added up, the bounds would hold far more often than they
-    are asked to, as all parts reach theirs together hardly ever.
+    With means µ and bounds q of the parts: Σ µ + √(Σ (q − µ)²), rounded up to a whole number; 0
+    where all parts together have none with this probability. A single part keeps its bound. The sum
+    of the bounds would be too wide, since the parts hardly ever reach theirs together.
     Source: G. Y. Zou and A. Donner, Stat. Med. 27 (2008) 1693-1702.
     """
     most, mean, none = np.moveaxis(np.asarray(parts), 1, 0)

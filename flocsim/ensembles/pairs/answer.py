@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from flocsim.body import Fluid, FractalDensity
-from flocsim.ensembles.config.loader import Reading, lay_over
+from flocsim.ensembles.config.loader import Reading, lay_over, value_at
 from flocsim.ensembles.config.schema import PRESETS, BodiesConfig
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.errors import ConfigError
+from flocsim.fields import is_number
 from flocsim.io.results.events import AGGREGATED, HOOK
 from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.run_group import stored
@@ -21,10 +22,11 @@ MOST_HANGING = 0.005
 """Fraction of the aggregated pairs up to which those that hang are not mentioned."""
 
 SURFACES = (
-    ("double_layer", "potential", "V", "surface potential"),
-    ("van_der_waals", "hamaker", "J", "Hamaker constant"),
+    ("forces.double_layer.potential", 1e3, "mV", "surface potential"),
+    ("forces.double_layer.debye_length", 1e9, "nm", "Debye length"),
+    ("forces.van_der_waals.hamaker", 1.0, "J", "Hamaker constant"),
 )
-"""Force, key, unit and words of what is said of the surfaces."""
+"""Key, unit over the SI unit, unit and words of what is said of the surfaces."""
 
 PHYSICS = ("bodies", "fluid", "forces", "zone")
 """Tables whose values a preset gives."""
@@ -150,10 +152,11 @@ def setting_sentence(results: Results) -> str:
     bodies = reading.made(BodiesConfig, table.get("bodies", {}), "bodies")
     words = f"Preset {name}" if name else "No preset"
     if name and (own := [each for each in PHYSICS if table.get(each) != preset.get(each)]):
-        words += f" with values of its own for {' and '.join(own)}"
+        words += f" with your values for {' and '.join(own)}"
     if fluid is not None and bodies is not None:
         water = fluid.words.partition(":")[0] or f"water of {1e3 * fluid.viscosity:.3g} mPa s"
-        known = weight_of(bodies, fluid), water, *surfaces_of(table.get("forces", {}))
+        reading.add_water(table, fluid)
+        known = weight_of(bodies, fluid), water, *surfaces_of(table)
         words += f": {', '.join(known)}"
     return f"{words}."
 
@@ -168,9 +171,12 @@ def weight_of(bodies: BodiesConfig, fluid: Fluid) -> str:
     return f"{bodies.surface_density:g} kg/m² of projected area{sunk}"
 
 
-def surfaces_of(forces: Mapping[str, Any]) -> Iterator[str]:
+def surfaces_of(table: Mapping[str, Any]) -> Iterator[str]:
     """Yield the potential and the Hamaker constant of the built-in forces that there are."""
-    for force, key, unit, words in SURFACES:
-        if isinstance(table := forces.get(force), dict) and key in table:
-            value = table[key]
-            yield f"{words} {value}{f' {unit}' * (not isinstance(value, str))}"
+    for key, factor, unit, words in SURFACES:
+        if (value := value_at(table, key)) is not None:
+            both = value if isinstance(value, list) else [value]  # of two unlike bodies
+            given = (
+                f"{factor * each:.3g} {unit}" if is_number(each) else str(each) for each in both
+            )
+            yield f"{words} {' and '.join(given)}"

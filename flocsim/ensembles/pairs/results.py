@@ -106,9 +106,9 @@ class PairFiles(Contents):
 
     title = "results of a collision ensemble"
     on_examples = (
-        "One pair of each class, run again from the seed and seen from the receiving floc: of the "
-        "most vertices, and in contact longer than three quarters of its class. Frames are spaced "
-        "by distance, not by time. Red rings mark contacts."
+        "One pair of each class at the largest N, run again from the seed and seen from the "
+        "receiving floc. It stays in contact longer than about three quarters of its class. Frames "
+        "are spaced by distance, not by time. Red rings mark contacts."
     )
     first = ("kernels", "efficiency", "outcomes", "delta", "8")
     file = schema.RESULTS

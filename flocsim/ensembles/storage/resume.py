@@ -227,5 +227,6 @@ REMEDY = f"{ELSEWHERE}, or start over with --restart, which keeps it under anoth
 def refuse_other(start: Beginning, path: str | Path, stored: dict, remedy: str = REMEDY) -> None:
     """UsageError where an identity in a file is not that of this study."""
     if lines := differences(stored, start.identity):
-        shown = "; ".join(lines[:MOST_DIFFERENCES])
+        more = [f"and {len(lines) - MOST_DIFFERENCES} more"] * (len(lines) > MOST_DIFFERENCES)
+        shown = "; ".join([*lines[:MOST_DIFFERENCES], *more])
         raise UsageError(f"{path} belongs to another study: {shown}; {remedy}")

@@ -5,8 +5,8 @@ while nothing moves. So, in a System or Swarm whose bodies touch:
 
 - After every PROBE steps that end at events, Implicit compares. If backward Euler would have
   needed AHEAD times fewer steps for that time than were tried, it hands over.
-- It takes back where nothing touches any more, where PROBE steps had AHEAD times fewer events, and
-  where bodies would rebound by more than the tolerance.
+- It takes back where nothing touches any more, where PROBE steps had AHEAD times fewer events,
+  where bodies would rebound by more than the tolerance, and where no step succeeds.
 
 The rule depends on counts of steps alone. Measured times would differ between machines.
 """
@@ -25,6 +25,7 @@ from flocsim.integrators.backward_euler.step import (
     start_across,
 )
 from flocsim.integrators.base import Adaptive
+from flocsim.integrators.loop.step_size import moves
 from flocsim.integrators.rhs.views import lever
 from flocsim.state.clock import NEVER, NOT_COMPILED
 from flocsim.state.work import AT_LAST_CHECK, NOW
@@ -73,6 +74,10 @@ FEWEST = 3
 
 PROBE = 60
 """Steps between two comparisons."""
+
+SHORTEST_ACROSS = 1e-2
+"""Steps across events are given up when they fail at this many times the smallest step: a fraction
+of them would move nothing. Three more would be tried before the run stalls."""
 
 AHEAD = 4.0
 """Factor by which backward Euler must need fewer steps."""
@@ -152,8 +157,11 @@ def no_step_across(scene, work, clock, step):
 def step_or_give_back(scene, work, clock, step):
     """Take one step across events; return −1 where it fails, or where bodies would rebound."""
     ratio, bounce = euler_step(scene, work, clock, step, False)
-    # Repeat with located events, which resolve the rebound.
-    if 0.0 <= ratio <= 1.0 and bounce > 0.0:
+    succeeds = 0.0 <= ratio <= 1.0
+    # Repeat with located events, which resolve a rebound. They are also the last resort before a
+    # run stalls: where two contacts switch together, no step across them may succeed, however
+    # short, while one that ends at the first switch does.
+    if (succeeds and bounce > 0.0) or not (succeeds or moves(clock, SHORTEST_ACROSS * step)):
         end_at_switches(scene, work, clock)
         return -1.0
     return ratio

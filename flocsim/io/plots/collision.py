@@ -101,7 +101,7 @@ def name_bodies(axes, frame, names):
     from matplotlib.patheffects import withStroke
 
     look = {"ha": "center", "va": "center", "fontsize": 8, "weight": "bold", "zorder": 7}
-    look["path_effects"] = [withStroke(linewidth=3.0, foreground="white")]
+    look["path_effects"] = [withStroke(linewidth=2.0, foreground="white")]
     for number, (body, name) in enumerate(zip(frame, names, strict=True)):
         colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
         axes.text(*deepest_inside(max(body, key=len)), name, color=colour, **look)

@@ -228,7 +228,7 @@ def draw_line(axes, kernel, name, place, colour):
     left_open = ~known & np.isfinite(high)
     axes.vlines(ratio[left_open], low[left_open], high[left_open], color=colour, linestyle=":")
     reach = np.maximum([(value - low)[known], (high - value)[known]], 0.0)
-    look = {"color": colour, **look_of(kernel, v)}
+    look = {"color": colour, "clip_on": False, **look_of(kernel, v)}
     axes.errorbar(ratio[known], value[known], reach, elinewidth=0.7, **look)
 
 
@@ -275,7 +275,7 @@ def over_rate(found: Strengths) -> Figure:
     types, vertices = found.table("type"), found.table("vertices")
     x_label = f"$G$ of the {plain(found.about.get('flow'))} [1/s]"
     titles = style.type_titles(types)
-    with style.panel_grid(titles, "share of bonds opened", x_label) as (figure, panels, spare):
+    with style.panel_grid(titles, "fraction of bonds opened", x_label) as (figure, panels, spare):
         colours = style.graded_colours(len(vertices))
         for number, axes in enumerate(panels):
             any_opened = 0

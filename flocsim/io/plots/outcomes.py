@@ -356,7 +356,7 @@ def draw_effect(axes, effect):
     measure, known = effect.measure, effect.measure.size
     for index, (name, colour) in enumerate(style.CLASS_COLOURS.items()):
         if known:
-            look = {"color": colour, "marker": style.MARKERS[1 + index]}
+            look = {"color": colour, "marker": style.MARKERS[1 + index], "clip_on": False}
             axes.plot(measure, effect.pr_class[0, index], lw=0.9, ms=2.5, label=name, **look)
     value, low, high = effect.pr_a if known else np.empty((3, 0))
     reach = np.clip([value - low, high - value], 0.0, None)

@@ -19,7 +19,7 @@ from flocsim.io.results.schema import Results
 
 NARROW = 4
 """Labels of vertex counts that fit a panel of three beside each other."""
-HOLLOW = f" Hollow: of fewer than {ends.FEW} pairs; missing: of none."
+HOLLOW = f" Hollow: fewer than {ends.FEW} pairs."
 DELTA_LABEL = r"displacement $\delta\,/\,\delta_{\max}$"
 LABELS = {
     "pr_inside": r"$\Pr[C(d_c<D_0)]$",
@@ -126,7 +126,7 @@ def against_delta(results: Results, numerics: bool = False) -> Figure:
 
 
 def outcomes(results: Results) -> Figure:
-    """What becomes of replicates, stacked to 1: panels by type, N on the axis, a bar each delta."""
+    """Outcomes of the replicates: a panel for each type, a bar for each N and displacement."""
     titles = style.type_titles(results.types)
     with style.panel_grid(titles, "fraction of replicates") as (figure, panels, spare):
         count = results.delta.size

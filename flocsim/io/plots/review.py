@@ -70,7 +70,7 @@ def section_of(place: int, picture: Any, jpeg: bytes) -> str:
         for number, each in enumerate(picture.choices["flocs"])
     ]
     name = escape(visible(picture.name, ""))
-    alarms = "".join(f"<p class='alarm'>Check: {escape(each)}.</p>" for each in found.alarms)
+    alarms = "".join(f"<p><b>Check: {escape(each)}.</b></p>" for each in found.alarms)
     # Whole numbers are the centres of pixels.
     return (
         f"<section><h2>{name}</h2>{alarms}<div class='frame'>"

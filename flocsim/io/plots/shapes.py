@@ -159,7 +159,7 @@ def draw_errors(axes, entries):
         mean, spread = errors.mean(axis=0), errors.std(axis=0)
         reach = [np.minimum(spread, mean), spread]
         label = rf"$r_\mathrm{{eq}}$ {sign} {CLASS_LIMIT:g} px ({len(members)})"
-        look = {"color": colour, "marker": marker, "label": label}
+        look = {"color": colour, "marker": marker, "label": label, "clip_on": False}
         axes.errorbar(places + shift, mean, reach, elinewidth=0.7, capsize=2, **look)
         if 1 in entries[0].fits:
             spheres = np.mean([e.fits[1].relative_error for e in members])
