@@ -96,12 +96,12 @@ def setting_of(config, **overrides):
         (
             "preset = 'clay'",
             "Preset clay: real weight, water of 15 °C and 35 g/kg of salt, surface potential "
-            "15 mV, Debye length 0.335 nm, Hamaker constant 2e-20 J.",
+            "15 mV, Debye length 0.341 nm, Hamaker constant 2e-20 J.",
         ),
         (
             "preset = 'clay'\n[fluid]\nsalinity = 5.0",
             "Preset clay with your values for fluid: real weight, water of 15 °C and 5 g/kg "
-            "of salt, surface potential 15 mV, Debye length 0.956 nm, Hamaker constant 2e-20 J.",
+            "of salt, surface potential 15 mV, Debye length 0.959 nm, Hamaker constant 2e-20 J.",
         ),
         (
             "preset = 'si'\n[fluid]\ntemperature = '10 degC'\nionic_strength = '10 mmol/l'",
