@@ -25,7 +25,6 @@ from flocsim.integrators.backward_euler.step import (
     start_across,
 )
 from flocsim.integrators.base import Adaptive
-from flocsim.integrators.loop.step_size import moves
 from flocsim.integrators.rhs.views import lever
 from flocsim.state.clock import NEVER, NOT_COMPILED
 from flocsim.state.work import AT_LAST_CHECK, NOW
@@ -75,9 +74,9 @@ FEWEST = 3
 PROBE = 60
 """Steps between two comparisons."""
 
-SHORTEST_ACROSS = 1e-2
-"""Steps across events are given up when they fail at this many times the smallest step: a fraction
-of them would move nothing. Three more would be tried before the run stalls."""
+SHORTEST_ACROSS = 1e-12
+"""Fraction of the elapsed time, or of 1 ms, below which failing steps across events are given up:
+a hundred times the step at which a run has stalled (SMALLEST_STEP in loop/step_size.py)."""
 
 AHEAD = 4.0
 """Factor by which backward Euler must need fewer steps."""
@@ -161,7 +160,8 @@ def step_or_give_back(scene, work, clock, step):
     # Repeat with located events, which resolve a rebound. They are also the last resort before a
     # run stalls: where two contacts switch together, no step across them may succeed, however
     # short, while one that ends at the first switch does.
-    if (succeeds and bounce > 0.0) or not (succeeds or moves(clock, SHORTEST_ACROSS * step)):
+    tiny = step < SHORTEST_ACROSS * max(clock.time, 1e-3)
+    if (succeeds and bounce > 0.0) or (tiny and not succeeds):
         end_at_switches(scene, work, clock)
         return -1.0
     return ratio
