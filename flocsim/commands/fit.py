@@ -220,7 +220,8 @@ def run(args: argparse.Namespace) -> int:
     print("\n".join([format_errors(entries), *population_lines(entries)]))
     counts = ", ".join(map(str, args.vertices))
     flocs = plural(len(entries) // len(args.radii), "floc")
-    left = [str(path) for path in paths if path not in {picture.path for picture in pictures}]
+    read = {picture.path for picture in pictures}
+    left = [str(path) for path in paths if path not in read]
     end = f"; left out: {', '.join(left)}" if left else ""
     print(f"{args.output}: {flocs} at N = {counts}; {table}: all regions{end}")
 

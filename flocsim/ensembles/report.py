@@ -7,7 +7,7 @@ import numpy as np
 
 from flocsim.errors import FlocsimError
 from flocsim.io.confidence import efficiency, wilson
-from flocsim.io.results.events import HOOK, MOST_UNKNOWN, events_of
+from flocsim.io.results.events import FEW, HOOK, MOST_UNKNOWN, events_of
 from flocsim.io.results.kernel_group import ESTIMATES, Kernel
 from flocsim.io.results.run_group import describe_note, stored
 from flocsim.io.results.schema import CLASSES, Results
@@ -19,9 +19,6 @@ OTHER = ("missed", "held", "undecided", "failed")
 
 FURTHER = ("collided", "inside", *OTHER)
 """Counts that have columns of their own only where all are asked for."""
-
-ENOUGH = 10
-"""Collisions of a condition from which its numerical error counts for the whole study."""
 
 LEGEND = (
     "A, B: contact inside the zone, then stick, part; C, D: the same outside; Pr[A]: A + C of all.",
@@ -302,10 +299,10 @@ def numerics_line(results: Results) -> str:
         return "Numerical error: not known, as no replicate was run again."
     line = f"Numerical error: {flipped or 'none'} of {checked} re-runs changed its outcome"
     # A single flip counts much where hardly any pair touched.
-    errors = table["pr_a_numerical"][events_of(table)["pr_a"].trials >= ENOUGH]
+    errors = table["pr_a_numerical"][events_of(table)["pr_a"].trials >= FEW]
     if not np.isfinite(errors).any():
         return f"{line}."
-    most = f"at most ±{np.nanmax(errors):.3f} wherever {ENOUGH} pairs or more touched (95 %)"
+    most = f"at most ±{np.nanmax(errors):.3f} wherever {FEW} pairs or more touched (95 %)"
     return f"{line}; Pr[A] is uncertain by {most}."
 
 

@@ -1,5 +1,7 @@
 """The time, the step sizes and the counters of a run."""
 
+import math
+
 from flocsim.state.records import Record
 
 
@@ -69,6 +71,18 @@ class Clock(Record):
     rates_known: float  # 1 if the accelerations of the last such step (LAST_RATES) are stored
     switches_since_check: float  # switches since progress was last checked
     checked_at: float  # time of that check [s]; inf: no check yet
+
+
+SMALLEST_STEP = 1e-14
+"""A step below this fraction of the elapsed time, or of 1 ms, moves nothing: rounding of the time
+is 2e-16. A run of such steps has stalled."""
+
+
+def moves(clock: Clock, step: float) -> bool:
+    """Return True if anything can have moved in a step that ended at the present time."""
+    if clock.tolerance == math.inf:
+        return clock.time - step < clock.time
+    return step >= SMALLEST_STEP * max(clock.time, 1e-3)
 
 
 NEVER = 2**63 - 1

@@ -33,7 +33,7 @@ EACH_SIDE = 0.975
 EACH_CONDITION = 0.99
 """The same for flips that second runs leave open. Rates of one study are estimated together, and a
 condition that flips three times as often as the others is to be covered, too: at 0.975 some such
-probabilities were covered in 85 % of small studies, at 0.99 in 92 % or more, with bounds that are a
+probabilities were covered in 85 % of small studies, at 0.99 in 95 % or more, with bounds that are a
 fifth wider (benchmarks.accuracy.numerical_error)."""
 
 OF_KINDS, SHIFTED = "of kinds", "shifted"

@@ -26,7 +26,7 @@ from flocsim.integrators.backward_euler.step import (
 )
 from flocsim.integrators.base import Adaptive
 from flocsim.integrators.rhs.views import lever
-from flocsim.state.clock import NEVER, NOT_COMPILED
+from flocsim.state.clock import NEVER, NOT_COMPILED, moves
 from flocsim.state.work import AT_LAST_CHECK, NOW
 
 RESOLVED_BOUNCE = 0.003
@@ -74,9 +74,9 @@ FEWEST = 3
 PROBE = 60
 """Steps between two comparisons."""
 
-SHORTEST_ACROSS = 1e-12
-"""Fraction of the elapsed time, or of 1 ms, below which failing steps across events are given up:
-a hundred times the step at which a run has stalled (SMALLEST_STEP in loop/step_size.py)."""
+SHORTEST_ACROSS = 100.0
+"""Factor over the smallest step that moves anything, below which failing steps across events are
+given up: a few quarterings before the run would stall."""
 
 AHEAD = 4.0
 """Factor by which backward Euler must need fewer steps."""
@@ -160,7 +160,7 @@ def step_or_give_back(scene, work, clock, step):
     # Repeat with located events, which resolve a rebound. They are also the last resort before a
     # run stalls: where two contacts switch together, no step across them may succeed, however
     # short, while one that ends at the first switch does.
-    tiny = step < SHORTEST_ACROSS * max(clock.time, 1e-3)
+    tiny = not moves(clock, step / SHORTEST_ACROSS)
     if (succeeds and bounce > 0.0) or (tiny and not succeeds):
         end_at_switches(scene, work, clock)
         return -1.0

@@ -56,7 +56,6 @@ from flocsim.integrators.loop.stated_error import (
 )
 from flocsim.integrators.loop.step_size import (
     choose_step,
-    moves,
     plan,
     reject,
     representable_step,
@@ -66,7 +65,7 @@ from flocsim.integrators.rhs.forces import copy_motion
 from flocsim.integrators.rhs.friction import limited_slip, slip_of_motion, slip_rate_of_gap_change
 from flocsim.integrators.rhs.surface_gap import flag_near, missed_sharing
 from flocsim.state.bodies import RECORD_MOTION, RECORD_TIME
-from flocsim.state.clock import NOTHING_FULL, PLAIN, SERIES
+from flocsim.state.clock import NOTHING_FULL, PLAIN, SERIES, moves
 from flocsim.state.contacts import CLOSED
 from flocsim.state.work import NEW, NOW
 

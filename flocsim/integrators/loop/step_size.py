@@ -19,7 +19,7 @@ from flocsim.integrators.loop.kicks import kick_end
 from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
 from flocsim.integrators.rhs.error import LARGEST_FACTOR, ROUNDING, SAFETY, SMALLEST_FACTOR
 from flocsim.integrators.rhs.views import contact_view, inertia, normal_rate, velocity_lifetime_of
-from flocsim.state.clock import PLAIN, RADAU
+from flocsim.state.clock import PLAIN, RADAU, moves
 from flocsim.state.contacts import CLOSED
 from flocsim.state.work import MOST_IN_SERIES, NOW, STIFFNESS
 
@@ -45,10 +45,6 @@ def adaptive_factor(clock, step, ratio, order):
         factor = min(factor, SAFETY * step / before * trend ** (1.0 / order))
     return min(max(factor, SMALLEST_FACTOR), LARGEST_FACTOR)
 
-
-SMALLEST_STEP = 1e-14
-"""A step below this fraction of the elapsed time, or of 1 ms, moves nothing: rounding of the time
-is 2e-16. A run of such steps has stalled."""
 
 FRACTION_OF_FAILED, RECOVERY = 0.6, 2.0
 """After a failed step, the next ones are at most this fraction of it; the bound then grows by
@@ -110,13 +106,6 @@ def representable_step(clock, step):
     if clock.tolerance == math.inf:
         return step
     return max(step, min(ROUNDING * clock.time, clock.until - clock.time))
-
-
-def moves(clock, step):
-    """Return True if anything can have moved in a step that ended at the present time."""
-    if clock.tolerance == math.inf:
-        return clock.time - step < clock.time
-    return step >= SMALLEST_STEP * max(clock.time, 1e-3)
 
 
 def reject(clock, counts, step, ratio, too_far):

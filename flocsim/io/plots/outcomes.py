@@ -14,7 +14,7 @@ import numpy as np
 from flocsim.io.confidence import bounded_sums, clustered_proportion, explained_share, proportion
 from flocsim.io.plots import style
 from flocsim.io.plots.style import Figure, drawing, plain
-from flocsim.io.results.events import ends_of, events, events_of
+from flocsim.io.results.events import FEW, ends_of, events, events_of
 from flocsim.io.results.numerics import numerics_matter
 from flocsim.io.results.schema import SHAPE_MEASURES, Results
 
@@ -25,9 +25,6 @@ COLOURS = {
 """Of the ends of replicates, in the order of the stack."""
 
 ENDS = ("", "_low", "_high", "_numerical")
-
-FEW = 10
-"""Trials below which a point is hollow: its probability says little."""
 
 NO_EVENTS = {
     "pr_inside": "no collision",

@@ -13,13 +13,13 @@ from flocsim.io.plots import outcomes as ends
 from flocsim.io.plots import style
 from flocsim.io.plots.outcomes import shape_effects
 from flocsim.io.plots.style import WIDTH, Figure, drawing, plain
-from flocsim.io.results.events import ENDS_COUNTED
+from flocsim.io.results.events import ENDS_COUNTED, FEW
 from flocsim.io.results.numerics import numerics_matter
 from flocsim.io.results.schema import Results
 
 NARROW = 4
 """Labels of vertex counts that fit a panel of three beside each other."""
-HOLLOW = f" Hollow: fewer than {ends.FEW} pairs."
+HOLLOW = f" Hollow: fewer than {FEW} pairs."
 DELTA_LABEL = r"displacement $\delta\,/\,\delta_{\max}$"
 LABELS = {
     "pr_inside": r"$\Pr[C(d_c<D_0)]$",
@@ -114,7 +114,7 @@ def against_delta(results: Results, numerics: bool = False) -> Figure:
             for index, colour in enumerate(colours[: len(results.vertices)]):
                 bands = [band[number, index][order] for band in found]
                 shift = POINTS * style.dodge(index, len(results.vertices))
-                few = ends.trials_of(results, "pr_a")[number, index][order] < ends.FEW
+                few = ends.trials_of(results, "pr_a")[number, index][order] < FEW
                 ends.draw_bars(axes, places, bands, index, colour, few, shift)
             known = results.probabilities["pr_a"][number]
             ends.note_if_empty(axes, known, ends.NO_EVENTS["pr_a"])
@@ -144,9 +144,9 @@ def outcomes(results: Results) -> Figure:
                 ends.draw_ends(axes, places, counts, 0.68 * slot / count, shift)
         style.place_legend(figure, {"": ends.end_handles(results.probabilities)}, spare)
         if count > 1:
-            places = ", ".join(f"{place:g}" for place in np.sort(results.delta))
-            grazes = " (grazes)" * places.endswith(" 1")
-            style.add_foot(figure, f"Bars of each N, from left: δ/δmax = {places}{grazes}.")
+            deltas = ", ".join(f"{delta:g}" for delta in np.sort(results.delta))
+            grazes = " (grazes)" * (1.0 in results.delta)
+            style.add_foot(figure, f"Bars of each N, from left: δ/δmax = {deltas}{grazes}.")
         return figure
 
 

@@ -29,6 +29,9 @@ DECIDED = len(CLASSES)
 MOST_UNKNOWN = 0.05
 """Share of a condition without an outcome up to which a study counts as done, unless it says."""
 
+FEW = 10
+"""Trials below which a probability of a condition says little."""
+
 AGGREGATED = (0, 2)
 INSIDE_CLASSES, OUTSIDE_CLASSES = (0, 1), (2, 3)
 CERTIFICATE, HOOK, REST = (1 + BONDS.index(name) for name in ("certificate", "hook", "rest"))

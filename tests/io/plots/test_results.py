@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from flocsim.io.confidence import wilson
-from flocsim.io.plots.outcomes import FEW
 from flocsim.io.plots.results import FIGURES, against_size, figure_4, figure_8
 from flocsim.io.plots.style import save
+from flocsim.io.results.events import FEW
 from flocsim.io.results.schema import POOLED
 from tests.helpers.synthetic_results import bonds_of, make_results
 from tests.helpers.tabulate import tabulate
