@@ -59,7 +59,9 @@ def kink_share(scene, work, row, which):
     # Too near to either end to be told from rounding.
     nearer, further = min(abs(before), abs(after)), max(abs(before), abs(after))
     at_rest = contact_event(scene, view_without_slip(view, view.overlap, 0.0), which)
-    negligible = max(KINK_FINENESS * further, KINK_ROUNDING * abs(at_rest))
+    # An overlap is known to the rounding of coordinates.
+    rounding = max(KINK_ROUNDING, at_least_rounding(work, NOW, 0.0) / view.overlap)
+    negligible = max(KINK_FINENESS * further, rounding * abs(at_rest))
     if before * after >= 0.0 or nearer <= negligible:
         return math.inf
     # Aim past the kink, so that the next step begins behind it.
