@@ -184,7 +184,7 @@ def switch_tolerance(scene, work, step, row, resolution, depth):
     before, after = work.geometry[NOW, row].gap, work.geometry[NEW, row].gap
     # A release, a real collision, or a graze that may be left unnoticed.
     if before < 0.0 <= after:
-        return release_resolution(scene, work, NEW, row, resolution)
+        return release_resolution(scene, work, step, row, resolution)
     if before >= 0.0 > after and keeps_approaching(work, step, row, depth):
         return touch_resolution(scene, work, NEW, row, resolution)
     return depth

@@ -10,6 +10,7 @@ from flocsim.constants import TINY
 from flocsim.integrators.rhs.contact_stiffness import normal_force_at, secant_stiffness
 from flocsim.integrators.rhs.error import at_least_rounding
 from flocsim.integrators.rhs.views import contact_view, normal_rate, velocity_lifetime_of
+from flocsim.state.work import NEW, NOW
 
 RESOLUTION = 1e-3
 """A switch is located to this fraction of the tolerance, and to OVERLAP_FRACTION of the deepest
@@ -60,16 +61,22 @@ def touch_resolution(scene, work, state, row, resolution):
     )
 
 
-def release_resolution(scene, work, state, row, resolution):
-    """Return by how much a contact may have opened before it is noticed [m], while its damping
-    pulls."""
-    speed = normal_rate(work, state, row)
+def release_resolution(scene, work, step, row, resolution):
+    """Return by how much a contact may have opened before it is noticed [m], while it pulls.
+
+    Damping pulls in proportion to the speed v of the opening, and a law with tension to the gap g:
+    both for the time g/v. A slow opening is therefore located more finely than a fast one.
+    """
+    rate, opening = normal_rate(work, NEW, row), work.geometry[NEW, row].gap
+    # The rate at the end of a long step may be wrong by many times itself.
+    speed = min(rate, (opening - work.geometry[NOW, row].gap) / step)
     if not speed > 0.0:
         return resolution
-    view = contact_view(scene, work, state, row)
-    # The velocity error is (pull/M) g/speed; it displaces the bodies by that times T.
+    view = contact_view(scene, work, NEW, row)
+    later = max(velocity_lifetime_of(work, row), TINY) / (MOST_LATER * resolution)
+    # The velocity error is (pull/M) g/v; it displaces the bodies by that times T.
     pull = abs(normal_force_at(scene, view, 0.0, -speed)) / view.effective_mass
-    by_lifetime = (
-        MOST_LATER * resolution * speed / max(pull * velocity_lifetime_of(work, row), TINY)
-    )
-    return at_least_rounding(work, state, min(resolution, by_lifetime))
+    by_damping = speed / max(pull * later, TINY)
+    stretch = abs(normal_force_at(scene, view, -resolution, 0.0)) / view.effective_mass
+    by_tension = math.sqrt(speed * resolution / max(stretch * later, TINY))
+    return at_least_rounding(work, NEW, min(resolution, by_damping, by_tension))

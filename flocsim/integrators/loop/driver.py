@@ -297,7 +297,7 @@ def advance(scene, work, observed, clock, counts, record):
         if share < 1.0 and trials < MOST_TRIALS:
             trials += 1
             if not ends_early(scene, work, clock, step, ratio, share):
-                limit = step_to_switch(scene, work, step, share)
+                limit = step_to_switch(scene, work, step, share, trials)
                 counts.located += 1
                 continue
             step *= share
