@@ -58,10 +58,13 @@ def body_change(view, axis):
 
 def contact_change(view, axis):
     """Return the increment [m or m/s] for axis 0–3: overlap, its rate, slip, its rate."""
-    value = (view.overlap, view.overlap_rate, view.slip, view.slip_rate)[axis]
-    # 1e-3 of the value, with a floor of 1e-13 m or 1e-9 m/s for a value of zero.
-    floor = 1e-13 if axis % 2 == 0 else 1e-9
-    return 1e-3 * abs(value) + floor
+    # Rates: 1e-3 of the value, with a floor for a value of zero.
+    if axis % 2 == 1:
+        return 1e-3 * abs((view.overlap_rate, view.slip_rate)[axis // 2]) + 1e-9
+    # Lengths: 1e-3 of those of the contact, as a limit of friction may be far below a picometre.
+    # Less slip, rather than more, does not exceed that limit.
+    size = 1e-3 * (abs(view.overlap) + abs(view.slip)) + 1e-18
+    return -size if axis == 2 and view.slip > 0.0 else size
 
 
 def pressed_contact(view):

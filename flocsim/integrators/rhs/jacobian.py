@@ -169,8 +169,8 @@ def sliding_derivatives(scene, work, row, normal, tangential):
     """Return the derivatives of (N, T) by the overlap of a sliding contact, along which ξ = s L
     [N/m]."""
     view = contact_view(scene, work, NOW, row)
-    # The difference step: a thousandth of the overlap, at least 1e-13 m.
-    by = 1e-3 * abs(view.overlap) + 1e-13
+    # The difference step: a thousandth of the overlap.
+    by = 1e-3 * abs(view.overlap) + 1e-18
     more = work.candidates[row].slide_direction * limit_slope(scene, work, NOW, row) * by
     deeper = moved_contact(
         view, view.overlap + by, view.overlap_rate, view.slip + more, view.slip_rate
