@@ -178,6 +178,7 @@ class System:
             or self.pieces.layer[2] > 0.0,
             "charges": self.pieces.layer[2] > 0.0,
             "plain": self.pieces.plain_bodies,
+            "sliding": "slip_limit" in self.pieces.laws,
             "water": resistance_of_pairs(self.forces) is not None,
         }
 

@@ -2,7 +2,7 @@
 
 With few bodies: the search for near pairs, as all pairs are watched (flocsim.state.work:
 ALL_PAIRS). With two bodies in a System: backward Euler, to which Implicit does not hand over below
-FEWEST bodies (backward_euler/method.py). Where no force needs them: sums along outlines, sums over
+FEWEST bodies (backward_euler/method.py), unless contacts may slide. Where no force needs them: sums along outlines, sums over
 charges, the numbers of shapes that drag in a flow uses, and the resistance of water between bodies.
 """
 
@@ -58,15 +58,15 @@ def none_apart(scene, work, time, a, b, displacement):
 
 
 def left_out(
-    bodies: float, *, outlines: bool, charges: bool, plain: bool, water: bool
+    bodies: float, *, outlines: bool, charges: bool, plain: bool, sliding: bool, water: bool
 ) -> dict[Callable, Callable]:
     """Return {hook: function} that replaces what a scene does not need by functions that do
     nothing.
 
     For flocsim.compiler.composer.compose. ``bodies`` is their number, or inf for any number.
     ``outlines`` and ``charges`` say if there are forces along outlines, and between charges;
-    ``plain`` if no kernel reads the numbers of shapes; ``water`` if two bodies resist each other
-    through it.
+    ``plain`` if no kernel reads the numbers of shapes; ``sliding`` if friction has a limit; ``water``
+    if two bodies resist each other through it.
     """
     replaced: dict[Callable, Callable] = {}
     # By forces.
@@ -83,7 +83,7 @@ def left_out(
     if not water:
         replaced |= pair_resistance.LEFT_OUT
     # By the number of bodies.
-    if bodies < FEWEST:
+    if bodies < FEWEST and not sliding:
         replaced |= {hand_over: keep_method, step_or_give_back: no_step_across}
     if bodies <= ALL_PAIRS:
         replaced |= {

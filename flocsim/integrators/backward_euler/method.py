@@ -69,10 +69,12 @@ class BackwardEuler(Adaptive):
 
 
 FEWEST = 3
-"""Bodies, fixed ones included. Two have few contacts: a System of two leaves all of this out."""
+"""Bodies, fixed ones included. Two have few contacts: a System of two leaves all of this out, unless
+its contacts stick and slide: two sliding contacts may excite a vibration that never ends."""
 
-PROBE = 60
-"""Steps between two comparisons."""
+PROBE, PROBE_OF_TWO = 60, 600
+"""Steps between two comparisons; among two bodies located events are more accurate, and come to an
+end sooner as a rule."""
 
 SHORTEST_ACROSS = 100.0
 """Factor over the smallest step that moves anything, below which failing steps across events are
@@ -104,7 +106,7 @@ def would_pay(scene, work, clock, trials, passed):
 
 
 def keep_method(scene, work, clock, counts):
-    """Never hand over: among two bodies steps that end at events are as good."""
+    """Never hand over: among two bodies without sliding, steps that end at events are as good."""
 
 
 @hook
@@ -114,9 +116,10 @@ def hand_over(scene, work, clock, counts):
         return
     tried = counts.steps + counts.rejected + counts.located
     trials = tried - counts.trials_at_check
+    probe = PROBE if work.poses.shape[0] >= FEWEST else PROBE_OF_TWO
     # Across events: take back where there are few, or nothing touches.
     if clock.across == 1.0:
-        enough = trials >= PROBE
+        enough = trials >= probe
         # Located events need no more steps than there are events.
         quiet = enough and AHEAD * clock.switches_since_check < trials
         if quiet or least_listed_gap(work) >= 0.0:
@@ -131,7 +134,7 @@ def hand_over(scene, work, clock, counts):
         if would_pay(scene, work, clock, trials, passed) and least_listed_gap(work) < 0.0:
             start_across(clock, passed)
     # Start the next comparison from here.
-    counts.next_check, counts.trials_at_check = counts.steps + PROBE, tried
+    counts.next_check, counts.trials_at_check = counts.steps + probe, tried
     clock.checked_at, clock.switches_since_check = clock.time, 0.0
     for body in range(work.place.shape[1]):
         for axis in range(3):

@@ -50,6 +50,7 @@ from flocsim.integrators.events.interpolation import end_within
 from flocsim.integrators.events.samples import cut_series
 from flocsim.integrators.loop.kicks import renew_kicks, snap_to_kick_end
 from flocsim.integrators.loop.stated_error import (
+    add_friction_uncertainty,
     add_switch_errors,
     propagate_errors,
     reset_slip_offsets,
@@ -110,7 +111,9 @@ def accept(scene, work, clock, counts, step, needs_lists):
         return False
     if controlled and has(scene, CONTACT_FORCE):
         # Steps across switches locate none, so they have no such errors.
-        if not across:
+        if across:
+            add_friction_uncertainty(scene, work, clock, step)
+        else:
             _, depth = switch_resolutions(work, clock)
             add_switch_errors(scene, work, clock, step, depth)
         reset_slip_offsets(work)

@@ -28,12 +28,12 @@ import math
 from flocsim.compiler.linker import apart
 from flocsim.constants import TINY
 from flocsim.geometry.contact.points import length_of, normal_component, tangential_component
-from flocsim.hooks import contact_force
+from flocsim.hooks import SLIP_LIMIT, contact_force, has
 from flocsim.integrators.exponential.collocation import nothing_swings, propagate_with_series
 from flocsim.integrators.radau.carried_error import add_step_error, overlap_error, propagate_error
 from flocsim.integrators.rhs.contact_stiffness import unresolved_fraction
-from flocsim.integrators.rhs.error import outline_size
-from flocsim.integrators.rhs.friction import grazing_force
+from flocsim.integrators.rhs.error import NEGLIGIBLE, outline_size
+from flocsim.integrators.rhs.friction import AT_LIMIT, grazing_force, slip_limit_at
 from flocsim.integrators.rhs.propagated_error import (
     GRAZING_AMPLIFICATION,
     SWITCH_AMPLIFICATION,
@@ -41,7 +41,13 @@ from flocsim.integrators.rhs.propagated_error import (
     bound_propagated,
     lifted_load,
 )
-from flocsim.integrators.rhs.views import contact_view, lever, normal_rate, pair_loads
+from flocsim.integrators.rhs.views import (
+    contact_view,
+    lever,
+    normal_rate,
+    pair_loads,
+    tangential_rate,
+)
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.clock import PLAIN, RADAU
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
@@ -53,6 +59,10 @@ tolerance, and of the sum of switching errors (a dozen grazes push it to and fro
 
 UNCERTAIN_OVERLAP = 2.0
 """A contact may be open if its overlap is below this multiple of its gap's error."""
+
+
+FRICTION_UNCERTAINTY = 0.1
+"""Fraction of the friction of a sliding contact that counts as uncertain in steps across events."""
 
 
 def propagate_sums(work, body, step):
@@ -279,6 +289,23 @@ def reset_slip_offsets(work):
             work.contacts[row].slip_offset = lost - tangential_component(
                 work, row, work.place, PROPAGATED, NOW
             )
+
+
+def add_friction_uncertainty(scene, work, clock, step):
+    """Count part of the friction of contacts that slide in a step across events as an error: they may
+    stick and slide in turn, by a vibration that the step damps, and bear less in the mean."""
+    if not has(scene, SLIP_LIMIT):
+        return
+    for row in range(work.tally.candidates):
+        if work.geometry[NOW, row].gap >= 0.0:
+            continue
+        slip, rate = work.slip[NOW, row], tangential_rate(work, NOW, row)
+        slides = slip * rate > 0.0 and abs(slip) >= AT_LIMIT * slip_limit_at(scene, work, NOW, row)
+        if slides and abs(rate) * step > NEGLIGIBLE * clock.tolerance:
+            _, friction = contact_force(scene, contact_view(scene, work, NOW, row))
+            impulse = FRICTION_UNCERTAINTY * step * abs(friction)
+            add_impulse_error(scene, work, work.candidates[row].vertex_body, impulse, False)
+            add_impulse_error(scene, work, work.candidates[row].edge_body, impulse, False)
 
 
 def add_switch_errors(scene, work, clock, step, depth):
