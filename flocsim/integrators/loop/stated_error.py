@@ -29,6 +29,7 @@ from flocsim.compiler.linker import apart
 from flocsim.constants import TINY
 from flocsim.geometry.contact.points import length_of, normal_component, tangential_component
 from flocsim.hooks import SLIP_LIMIT, contact_force, has
+from flocsim.integrators.events.crossings import any_touching
 from flocsim.integrators.exponential.collocation import nothing_swings, propagate_with_series
 from flocsim.integrators.radau.carried_error import add_step_error, overlap_error, propagate_error
 from flocsim.integrators.rhs.contact_stiffness import unresolved_fraction
@@ -88,9 +89,9 @@ def error_growth_rate(scene, work):
 
     It is positive where forces drive bodies apart, or together, the more the further they are off.
     It is 0 if tangential displacements are in error, too, as growth then does not follow from the
-    positions.
+    positions, and where the error of the velocity shrinks, as where a contact damps it.
     """
-    pushed = size = 0.0
+    pushed = size = grown = 0.0
     for body in range(work.place.shape[1]):
         for axis in range(3):
             if work.velocity[FORCING, body, axis] != 0.0:
@@ -101,8 +102,11 @@ def error_growth_rate(scene, work):
             more = work.velocity[CHANGE, body, axis]
             more -= work.velocity[PROPAGATED, body, axis]
             pushed += 0.5 * square * (now + later) * more
+            grown += square * (
+                work.velocity[CHANGE, body, axis] ** 2 - work.velocity[PROPAGATED, body, axis] ** 2
+            )
             size += square * 0.25 * (now + later) ** 2
-    return pushed / size if pushed > 0.0 and size > 0.0 else 0.0
+    return pushed / size if min(pushed, size, grown) > 0.0 else 0.0
 
 
 def amplify_sums(scene, work, step):
@@ -132,7 +136,8 @@ def propagate_vector(scene, work, clock, step):
     full = work.tally.series_step
     propagate_with_series(work, clock, full, step / full)
     # Let the scalar sums grow at the rate of the vector, for example towards an attraction.
-    if nothing_swings(clock):
+    # A contact that is closed resists an error.
+    if nothing_swings(clock) and not any_touching(work):
         amplify_sums(scene, work, step)
     add_step_error(work)
     return bound_propagated(scene, work)
@@ -146,7 +151,7 @@ def propagate_errors(scene, work, clock, step):
     # surface forces, whose fractions may change inside a step.
     across = clock.across == 1.0
     share = 1.0 if scene.surface_reach > 0.0 else clock.estimate_share
-    weight = 1.0 / share if across else 1.0
+    weight = SWITCH_AMPLIFICATION / share if across else 1.0
     # Sums: propagate, then add the estimate of this step (in full across switches: 1/share undoes
     # share).
     for body in range(work.poses.shape[0]):
@@ -181,6 +186,9 @@ def propagate_errors(scene, work, clock, step):
             least = LEAST_VECTOR * max(clock.tolerance, errors.switch_displacement)
             own = max(outline_size(scene, work.place, PROPAGATED, body), least)
             stated = min(stated, VECTOR_SAFETY * own)
+        # Once bodies have touched, iterations and located events leave what no estimate sees.
+        if errors.switch_displacement > 0.0:
+            stated = max(stated, LEAST_VECTOR * clock.tolerance)
         errors.stated = stated
         clock.error = max(clock.error, stated)
 
