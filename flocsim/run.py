@@ -186,13 +186,38 @@ class Run:
 
     @property
     def error(self) -> float:
-        """Stated error of the motion [m]."""
-        return float(self.clock.error)
+        """Stated error of the motion [m]; inf where nothing is known of it (see known_error)."""
+        start, now = self.saved[0][0], self.row_now()[0]
+        velocity = np.stack([row[1:].reshape(-1, 6)[:, 3:] for row in (start, now)])
+        sizes, elapsed = self.scene.bodies["bounding_radius"], now[0] - start[0]
+        return float(known_error(np.array(self.clock.error), velocity, sizes, elapsed))
 
     @property
     def code(self) -> int:
         """Last code of the observer."""
         return int(self.counts.code)
+
+
+def known_error(
+    stated: np.ndarray, velocity: np.ndarray, sizes: np.ndarray, elapsed: float
+) -> np.ndarray:
+    """Return stated errors [m], with inf for those beyond the reach of the bodies.
+
+    Parameters
+    ----------
+    stated : float array
+        Bounds of errors [m].
+    velocity : (..., n, 3) float array
+        Velocities of the bodies at some times of the run [m/s, m/s, rad/s].
+    sizes : (n,) float array
+        Bounding radii [m].
+    elapsed : float
+        Duration of the run [s].
+    """
+    speeds = np.hypot(velocity[..., 0], velocity[..., 1]) + sizes * np.abs(velocity[..., 2])
+    # In this time nothing has moved further than by about this, right or wrong.
+    reach = speeds.max(initial=0.0) * elapsed + sizes.max(initial=0.0)
+    return np.where(stated > reach, np.inf, stated)
 
 
 def locate(scene: Any, work: Work) -> bool:

@@ -2,8 +2,9 @@
 
 With few bodies: the search for near pairs, as all pairs are watched (flocsim.state.work:
 ALL_PAIRS). With two bodies in a System: backward Euler, to which Implicit does not hand over below
-FEWEST bodies (backward_euler/method.py), unless contacts may slide. Where no force needs them: sums along outlines, sums over
-charges, the numbers of shapes that drag in a flow uses, and the resistance of water between bodies.
+FEWEST bodies (backward_euler/method.py) unless contacts may slide. Where no force needs them: sums
+along outlines, sums over charges, the numbers of shapes that drag in a flow uses, and the
+resistance of water between bodies.
 """
 
 import math
@@ -65,8 +66,8 @@ def left_out(
 
     For flocsim.compiler.composer.compose. ``bodies`` is their number, or inf for any number.
     ``outlines`` and ``charges`` say if there are forces along outlines, and between charges;
-    ``plain`` if no kernel reads the numbers of shapes; ``sliding`` if friction has a limit; ``water``
-    if two bodies resist each other through it.
+    ``plain`` if no kernel reads the numbers of shapes; ``sliding`` if friction has a limit;
+    ``water`` if two bodies resist each other through it.
     """
     replaced: dict[Callable, Callable] = {}
     # By forces.

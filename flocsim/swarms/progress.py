@@ -14,6 +14,7 @@ import numpy as np
 
 import flocsim.swarms.arrays as sw
 from flocsim.integrators.base import Status
+from flocsim.run import known_error
 from flocsim.state.bodies import VX, VY
 from flocsim.swarms.arrays import Swarm, with_links
 from flocsim.swarms.placement import REMOVE, Leaving
@@ -166,16 +167,23 @@ class Progress:
         return way / fastest if fastest > 0.0 else math.inf
 
     @property
+    def errors(self) -> np.ndarray:
+        """The stated errors of position of the bodies that move [m]; inf where not known."""
+        free, swarm = self.free, self.swarm
+        sizes = swarm.bodies[free]["bounding_radius"]
+        return known_error(self.stated[free], swarm.motion[free][:, VX:], sizes, self.time)
+
+    @property
     def median_error(self) -> float:
         """The stated error of position that half of the bodies that move keep below [m]."""
-        return float(np.median(self.stated[self.free])) if self.free.any() else 0.0
+        return float(np.median(self.errors)) if self.free.any() else 0.0
 
     def seen(self) -> tuple[float, np.ndarray, float]:
         """(time [s], motion (n, 6), the largest stated error [m]) now; NaN for bodies that are
         gone."""
         motion = self.swarm.motion.copy()
         motion[self.gone] = math.nan
-        return self.time, motion, float(self.stated[self.free].max(initial=0.0))
+        return self.time, motion, float(self.errors.max(initial=0.0))
 
     def state(self) -> dict[str, np.ndarray]:
         """All that the rest of the run follows from, as arrays by name."""

@@ -47,7 +47,7 @@ class SwarmTrajectory:
     position, velocity : (k, n, 3) float array
         [m, m, rad] and [m/s, m/s, rad/s]; positions continue through a periodic box.
     error : (k,) float array
-        Largest stated error of position of a body [m].
+        Largest stated error of position of a body [m]; inf where one is not known.
     status : Status
         How the run ended.
     failed : int array or None

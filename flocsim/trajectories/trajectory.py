@@ -67,8 +67,9 @@ class Trajectory:
     steps, rejected, evaluations : int
         Numbers of accepted and of rejected steps, and of force evaluations.
     error : float
-        Stated error of position at the end [m], propagated from all steps; NaN if the method
-        does not estimate it.
+        Stated error of position at the end [m], propagated from all steps; inf if it is not known,
+        as its bound exceeds the distance that the bodies can have moved; NaN if the method does
+        not estimate it.
     wall_time : float
         [s]
     amplification : float or None
@@ -102,8 +103,10 @@ class Trajectory:
     @property
     def error_text(self) -> str:
         """Description of the stated error at the end."""
-        if not np.isfinite(self.error):
+        if np.isnan(self.error):
             return "the method does not estimate its error"
+        if np.isinf(self.error):
+            return "the error is not known: its bound is beyond the reach of the bodies"
         stated = f"stated error {self.error:.2g} m"
         if self.amplification is None:
             return stated

@@ -69,8 +69,8 @@ class BackwardEuler(Adaptive):
 
 
 FEWEST = 3
-"""Bodies, fixed ones included. Two have few contacts: a System of two leaves all of this out, unless
-its contacts stick and slide: two sliding contacts may excite a vibration that never ends."""
+"""Bodies, fixed ones included. Two have few contacts: a System of two leaves all of this out, but
+where contacts stick and slide, as two of them may excite a vibration that never ends."""
 
 PROBE, PROBE_OF_TWO = 60, 600
 """Steps between two comparisons; among two bodies located events are more accurate, and come to an

@@ -300,8 +300,8 @@ def reset_slip_offsets(work):
 
 
 def add_friction_uncertainty(scene, work, clock, step):
-    """Count part of the friction of contacts that slide in a step across events as an error: they may
-    stick and slide in turn, by a vibration that the step damps, and bear less in the mean."""
+    """Count part of the friction of contacts that slide in a step across events as an error: they
+    may stick and slide in turn, by a vibration that the step damps, and bear less in the mean."""
     if not has(scene, SLIP_LIMIT):
         return
     for row in range(work.tally.candidates):

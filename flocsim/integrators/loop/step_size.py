@@ -174,8 +174,8 @@ def step_to_switch(scene, work, step, share, trials):
     instead, as long as MAX_PHASE allows, but at most half of the step. ``trials`` counts the steps
     that were meant to end at this switch.
     """
-    # The gap of a contact with almost no load has errors at the end of a long step, where each trial
-    # shows the switch again, though it came much earlier.
+    # The gap of a contact with almost no load has errors at the end of a long step, where each
+    # trial shows the switch again, though it came much earlier.
     if work.tally.kind == RADAU and trials >= RECURS:
         return min(share, 0.5) * step
     fastest = fastest_vibration(scene, work)

@@ -181,9 +181,14 @@ SWARMS = FileFormat("flocsim swarm", 6, "results of a swarm", GROUPS, view=Swarm
 
 def mean(values: np.ndarray) -> np.ndarray:
     """Return the mean over replicates that got so far; NaN where none did."""
-    known = np.isfinite(values)
+    reached = ~np.isnan(values)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(known, values, 0.0).sum(axis=0) / known.sum(axis=0)
+        return np.where(reached, values, 0.0).sum(axis=0) / reached.sum(axis=0)
+
+
+def error_text(error: float) -> str:
+    """Return a stated error [m] as text; inf is one that is not known."""
+    return "not known" if np.isinf(error) else f"{error:.1e}"
 
 
 def events_of(labels: np.ndarray) -> dict[str, np.ndarray]:
@@ -243,18 +248,18 @@ def rows_of(found: SwarmResults) -> list[list[str]]:
     """Return heads, and numbers on the clusters at each time, means over replicates."""
     counts = found.groups["counts"]
     columns = {
-        "time [s]": (found.scales["time"], "{:.4g}"),
-        "clusters": (mean(counts["clusters"]), "{:.1f}"),
-        "largest": (mean(counts["largest"]), "{:.1f}"),
-        "mean size": (mean(counts["mean_size"]), "{:.2f}"),
-        "percolating": (mean(counts["percolating"]), "{:.1f}"),
-        "R_g [um]": (1e6 * mean(counts["gyration"]), "{:.3g}"),
-        "porosity": (mean(counts["porosity"]), "{:.3f}"),
-        "certificates": (mean(counts["bonds_certificate"]), "{:.1f}"),
-        "hooks": (mean(counts["bonds_hook"]), "{:.1f}"),
-        "settling [mm/s]": (1e3 * mean(counts["settling"]), "{:.4g}"),
-        "median position error [m]": (mean(counts["median_error"]), "{:.1e}"),
-        "largest [m]": (mean(counts["error"]), "{:.1e}"),
+        "time [s]": (found.scales["time"], "{:.4g}".format),
+        "clusters": (mean(counts["clusters"]), "{:.1f}".format),
+        "largest": (mean(counts["largest"]), "{:.1f}".format),
+        "mean size": (mean(counts["mean_size"]), "{:.2f}".format),
+        "percolating": (mean(counts["percolating"]), "{:.1f}".format),
+        "R_g [um]": (1e6 * mean(counts["gyration"]), "{:.3g}".format),
+        "porosity": (mean(counts["porosity"]), "{:.3f}".format),
+        "certificates": (mean(counts["bonds_certificate"]), "{:.1f}".format),
+        "hooks": (mean(counts["bonds_hook"]), "{:.1f}".format),
+        "settling [mm/s]": (1e3 * mean(counts["settling"]), "{:.4g}".format),
+        "median position error [m]": (mean(counts["median_error"]), error_text),
+        "largest [m]": (mean(counts["error"]), error_text),
     }
-    rows = zip(*(map(form.format, values) for values, form in columns.values()), strict=True)
+    rows = zip(*(map(form, values) for values, form in columns.values()), strict=True)
     return [[*columns], *map(list, rows)]
