@@ -263,6 +263,17 @@ def changes_sides(work):
     return False
 
 
+def any_passes_through(work):
+    """Return True if a vertex has passed through an edge, from one side of it to the other, in a
+    step of fixed size."""
+    g = work.geometry
+    for row in range(work.tally.candidates):
+        inside = g[NOW, row].turning == 0.0 and g[NEW, row].turning == 0.0
+        if inside and g[NOW, row].side != g[NEW, row].side:
+            return True
+    return False
+
+
 def first_switch(scene, work, step, resolution, depth):
     """Return the fraction of the step at which the first mode must change; inf if none has to.
 

@@ -33,6 +33,7 @@ from flocsim.integrators.backward_euler.method import hand_over
 from flocsim.integrators.backward_euler.step import note_rates
 from flocsim.integrators.events.crossings import (
     any_overtakes,
+    any_passes_through,
     any_too_deep,
     any_touching,
     changes_sides,
@@ -304,6 +305,9 @@ def advance(scene, work, observed, clock, counts, record):
                 counts.located += 1
                 continue
             step *= share
+        # Steps of fixed size are not repeated, however far they lead.
+        if needs_lists and clock.tolerance == math.inf and any_passes_through(work):
+            return TOO_DEEP
         # 4. Accept.
         was_flying = work.tally.kind == SERIES and not any_touching(work)
         planned = clock.step
