@@ -7,12 +7,32 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from flocsim.geometry.shapes.cores import cross
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.state.outlines import EDGE, LONE, NOTHING, CorePoint
 
 
+STRAIGHT = 1e-9
+"""Angle [rad] up to which an outline goes straight on at a vertex."""
+
+
+def corners(ring: np.ndarray) -> np.ndarray:
+    """Return the vertices of a ring (N, 2) [m] at which its outline turns.
+
+    At a joint of two edges in one line both would bear a contact, with twice the stiffness, and a
+    disk that rolls or slides across would lose energy to its vibration.
+    """
+    if len(ring) <= 3:
+        return ring
+    before, behind = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    along = np.sum(before * behind, axis=1)
+    turns = np.abs(cross(before, behind)) > STRAIGHT * np.abs(along)
+    return ring[turns | (along <= 0.0)]
+
+
 def ring_points(ring: np.ndarray, excess: float) -> Any:
     """Return the CorePoints of a ring (N, 2) [m]; ``excess`` of its spheroradius [m]."""
+    ring = corners(ring)
     count = len(ring)
     points = CorePoint.rows(count)
     points["x"], points["y"], points["excess_radius"] = *ring.T, excess
