@@ -336,11 +336,16 @@ class System:
         if status in UNABLE and (why := force_to_blame(self, run)):
             warnings.warn(f"the run ended at t = {run.time:.6g} s ({status.name}): {why}",
                           KernelWarning, stacklevel=2)  # fmt: skip
-        growth = None
-        if amplification:
-            growth = self.amplification(run.time, run.work.place[NOW], max_steps, jit=jit)
+        measure = None
+        if start is None:
+            measure = functools.partial(
+                self.amplification, run.time, run.work.place[NOW].copy(), max_steps, jit=jit
+            )
+        growth = measure() if measure is not None and amplification else None
         legs = ((run.steps, end),)
-        origin = Origin(self.bodies, self.forces, self.fluid, self.integrator, fresh, run, legs)
+        origin = Origin(
+            self.bodies, self.forces, self.fluid, self.integrator, fresh, run, legs, measure
+        )
         return Trajectory.of(run, status, time.perf_counter() - began, growth, origin=origin)
 
     def begin_at(self, start: Trajectory | None, until: float, **more: Any) -> Run:

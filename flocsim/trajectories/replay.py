@@ -53,7 +53,8 @@ class Origin:
     """What a Trajectory came from: its scene, a way to begin its run anew, and the run at its end.
 
     ``begin()`` makes a Run that has yet to take its first step and records nothing; ``legs``: the
-    stretches that it ran, each (steps taken by its end, the time [s] until which it was to run).
+    stretches that it ran, each (steps taken by its end, the time [s] until which it was to run);
+    ``measure_growth()`` runs a perturbed companion, and returns Trajectory.amplification.
     """
 
     bodies: tuple[Body, ...]
@@ -63,6 +64,7 @@ class Origin:
     begin: Callable[[], Run]
     ended: Run
     legs: tuple[tuple[int, float], ...]
+    measure_growth: Callable[[], float] | None = None
 
     @property
     def has_stages(self) -> bool:

@@ -74,7 +74,7 @@ class Trajectory:
         [s]
     amplification : float or None
         Factor by which the motion amplifies a perturbation; None if it was not asked for. Above
-        10 the error is not guaranteed, and ``error_text`` says so.
+        10 the error is not guaranteed, and ``error_text``, which measures it, says so.
     row : dict or None
         Of a replicate of a study: its row of the table of replicates, in words.
     """
@@ -100,22 +100,34 @@ class Trajectory:
             f"{self.steps} steps, {self.status.name})"
         )
 
+    @functools.cached_property
+    def growth(self) -> float | None:
+        """Amplification, measured now by a companion run if it has not been; None if it cannot
+        be."""
+        if self.amplification is None and self.origin is not None and self.origin.measure_growth:
+            return self.origin.measure_growth()
+        return self.amplification
+
     @property
     def error_text(self) -> str:
-        """Description of the stated error at the end."""
+        """Description of the stated error at the end, and of what the motion amplifies.
+
+        Takes as long as the run itself, unless its amplification is known.
+        """
         if np.isnan(self.error):
             return "the method does not estimate its error"
         if np.isinf(self.error):
             return "the error is not known: its bound is beyond the reach of the bodies"
         stated = f"stated error {self.error:.2g} m"
-        if self.amplification is None:
+        growth = self.growth
+        if growth is None:
             return stated
-        if self.amplification > MOST_AMPLIFIED:
+        if growth > MOST_AMPLIFIED:
             return (
                 f"{stated}, which is not a guarantee: the motion amplifies a perturbation "
-                f"{self.amplification:.2g} times"
+                f"{growth:.2g} times"
             )
-        return f"{stated}; the motion amplifies a perturbation {self.amplification:.2g} times"
+        return f"{stated}; the motion amplifies a perturbation {growth:.2g} times"
 
     @classmethod
     def of(
@@ -328,7 +340,9 @@ class Trajectory:
         run.clock.until = end
         run.counts.max_steps += max_steps
         status = watched(run, watch)
-        made = attrs.evolve(origin, ended=run, legs=(*origin.legs, (run.steps, end)))
+        legs = *origin.legs, (run.steps, end)
+        # What a companion would be compared with has moved on.
+        made = attrs.evolve(origin, ended=run, legs=legs, measure_growth=None)
         return Trajectory.of(run, status, self.wall_time + time.perf_counter() - began, origin=made)
 
     def plot(

@@ -53,9 +53,14 @@ def test_settling_amplifies_nothing_and_says_the_same_each_time():
     )
 
 
-def test_nothing_is_said_that_was_not_asked_for():
-    found = System(pair(), [], DormandPrince54()).run(1e-5, jit=False)
+def test_the_error_is_never_described_without_the_amplification():
+    found = System(pair(), [Saddle()], DormandPrince54(1e-11)).run(4.0 / RATE, jit=False)
     assert found.amplification is None
+    assert found.error_text.endswith("the motion amplifies a perturbation 27 times")
+
+
+def test_a_run_that_went_on_states_its_error_alone():
+    found = System(pair(), [], DormandPrince54()).run(1e-5, jit=False).go_on(2e-5)
     assert found.error_text == f"stated error {found.error:.2g} m"
 
 
