@@ -11,6 +11,7 @@ class ContactState(Record):
     newly_grazing: float  # 1 during the first step of grazing
     grazing_resistance: float  # K in T = T₀ − K d(gap)/dt while it grazes [N s/m]
     gap_offset: float  # gap at which a grazing pair is pinned; gaps count from it [m]
+    start_gap: float  # gap at the start of the last step [m]
     flight_gap: float  # largest gap since the pair last opened [m]
     short_flights: float  # successive flights far below the tolerance (events.grazes)
     landing_time: float  # time of touching after the last such flight [s]

@@ -88,6 +88,7 @@ def adopt_new_state(work):
     """Make the new state the current one."""
     copy_motion(work, NEW, NOW)
     for row in range(work.tally.candidates):
+        work.contacts[row].start_gap = work.geometry[NOW, row].gap
         work.geometry[NOW, row] = work.geometry[NEW, row]
         # Open pairs have no displacement; grazing ones keep that with which they parted.
         if work.candidates[row].contact_mode == CLOSED:

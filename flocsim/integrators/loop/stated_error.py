@@ -239,7 +239,9 @@ def uncertain_time(work, row, step, overlap_uncertainty, resolved):
     gap = work.geometry[NOW, row].gap
     # It switched: detected too late by (|gap| + its error)/speed.
     if has_switched(work, row):
-        speed = abs(normal_rate(work, NOW, row))
+        # The rate at the end of a long step may be wrong by many times itself.
+        way = abs(gap - work.contacts[row].start_gap)
+        speed = min(abs(normal_rate(work, NOW, row)), way / step)
         return min((abs(gap) + overlap_uncertainty) / speed, step) if speed > 0.0 else step
     # It did not: uncertain all along if the overlap is within its error.
     deepest = max(
