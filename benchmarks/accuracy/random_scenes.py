@@ -3,7 +3,7 @@
     python -m benchmarks.accuracy.random_scenes [--quick] [--scenes 2000] [--first 0] [--family …]
 
 Scene k depends on k alone, so that a number names it for good. The families take turns: any
-fifteen numbers in a row have all of them. Scenes are short, a few hundred steps of some bodies of
+seventeen numbers in a row have all of them. Scenes are short, a few hundred steps of some bodies of
 5 µm in water, and share few compiled engines, so that thousands run in minutes. `constants` counts
 in how many of them an outcome depends on a constant of the engine.
 """
@@ -319,6 +319,41 @@ def between_spheres(draw):
     return System(bodies, [*forces, contact(draw)], implicit(draw), WATER), until
 
 
+def outline(draw, least, largest):
+    """Draw a star-shaped, wavy or convex polygon of 5 to 29 vertices."""
+    kind = draw.pick(star, wavy, convex)
+    count = 24 if kind is wavy else int(draw.rng.integers(5, 30))
+    return made(draw, kind(count), between(draw, least, largest))
+
+
+def sliding_pairs(draw):
+    """Let a polygon slide off another one under a large weight, without tension."""
+    shapes = [outline(draw, 3e-6, 12e-6) for _ in range(2)]
+    bodies = stack(draw, [Body(shapes[0], density=DENSITY)], shapes[1:], gap=1e-7, lean=1.2)
+    bodies[0] = attrs.evolve(bodies[0], fixed=draw.pick(True, False, False))
+    weight, k_n = between(draw, 9.81, 200.0), between(draw, 0.5, 20.0)
+    law = Contact(
+        k_n=k_n, k_t=draw.uniform(0.1, 0.6) * k_n, friction=between(draw, 0.2, 1.0),
+        tension=False, damping_n=draw.pick(0.0, 1e4, 1e5, "critical"),
+    )  # fmt: skip
+    until = settling_time(shapes[1].equivalent_radius, between(draw, 1e-6, 3e-5))
+    method = Implicit(between(draw, 1e-10, 3e-9))
+    forces = [Gravity(weight), StokesDrag(), law]
+    return System(bodies, forces, method, WATER), until * STANDARD_GRAVITY / weight
+
+
+def heavy_pairs(draw):
+    """Let a polygon roll over another one under a very large weight: contacts unload slowly."""
+    shapes = [outline(draw, 1e-6, 6e-6) for _ in range(2)]
+    bodies = stack(draw, [Body(shapes[0], density=DENSITY)], shapes[1:], gap=1e-7, lean=0.6)
+    weight = between(draw, 100.0, 3000.0)
+    law = Contact(k_n=20.0, k_t=draw.pick(0.0, 2.0, 2.0))
+    until = settling_time(shapes[1].equivalent_radius, between(draw, 1e-6, 2e-5))
+    forces = [Gravity(weight), StokesDrag(), law]
+    method = Implicit(between(draw, 5e-12, 1e-9))
+    return System(bodies, forces, method, WATER), until * STANDARD_GRAVITY / weight
+
+
 def columns(draw):
     """Stack two to four bodies on a floor, on which they lean and slide."""
     shapes = [shape(draw) for _ in range(draw.pick(2, 3, 4))]
@@ -402,6 +437,8 @@ FAMILIES: dict[str, Callable] = {
     "inclines": inclines,
     "forces along outlines": along_outlines,
     "forces between spheres": between_spheres,
+    "sliding pairs": sliding_pairs,
+    "heavy pairs": heavy_pairs,
     "columns": columns,
     "kicks": kicks,
     "pair hydrodynamics": pair_hydrodynamics,

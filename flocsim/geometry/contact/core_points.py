@@ -11,7 +11,6 @@ from flocsim.geometry.shapes.cores import cross
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.state.outlines import EDGE, LONE, NOTHING, CorePoint
 
-
 STRAIGHT = 1e-9
 """Angle [rad] up to which an outline goes straight on at a vertex."""
 

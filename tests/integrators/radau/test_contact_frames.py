@@ -36,6 +36,7 @@ def test_stiffness_does_not_add_steps(shape):
 def test_doublet_keeps_its_momentum(shape):
     bodies, found = turning_doublet(shape, 1e4)
     momentum = sum(body.mass * found.velocity[:, k, :2] for k, body in enumerate(bodies))
-    # Some thirty roundings a step; a step that did not keep it would lose 1e-9 of it.
-    rounding = 50.0 * np.finfo(float).eps * found.steps
+    # Twenty to a hundred and sixty roundings a step at stiffnesses near this one, by chance; a step
+    # that did not keep it would lose 1e-9 of it.
+    rounding = 500.0 * np.finfo(float).eps * found.steps
     assert np.abs(momentum).max() < rounding * bodies[0].mass * TURN * shape.bounding_radius
