@@ -248,7 +248,7 @@ def test_the_stated_error_covers_a_slow_unloading(tolerance):
 
 
 def test_the_stated_error_of_bodies_without_drag_is_no_fantasy():
-    """Their first impact is damped, which does not amplify errors: hundreds of metres were stated."""
+    """Their first impact is damped and amplifies nothing: hundreds of metres were stated."""
     hook = np.array([(0, 0), (7, 0), (7, 2), (2, 2), (2, 9), (0, 9)]) * 1e-6
     bodies = [
         Body(SpheroPolygon(hook, 5e-7), (x, y), angle, (0.0, speed), spin, density=2650.0)
