@@ -14,7 +14,7 @@ from benchmarks.stability.case import Draw
 from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
-from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag
+from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
 from flocsim.integrators.amplification import end_distance
 from flocsim.io.results.schema import BONDS, OUTCOMES
@@ -256,3 +256,14 @@ def test_the_stated_error_of_bodies_without_drag_is_no_fantasy():
     ]
     run = System(bodies, [Contact(k_n=20.0, k_t=2.0, friction=0.3)], Implicit(1e-9)).run(2e-2)
     assert 1e-12 < run.error < 1e-6
+
+
+def test_outlines_that_attract_more_than_contacts_bear_are_too_deep():
+    """The attraction of outlines has a pole at an overlap of half the smaller spheroradius."""
+    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 2e-6
+    bodies = [
+        Body(SpheroPolygon(square, radius), (0.0, y), density=2650.0)
+        for radius, y in ((2e-7, 0.0), (6e-7, 4.805e-6))
+    ]
+    forces = [StokesDrag(), VanDerWaals(5e-19, law="outline"), Contact(k_n=0.5, k_t=0.1)]
+    assert System(bodies, forces, Implicit(1e-9)).run(1e-3).status == Status.TOO_DEEP

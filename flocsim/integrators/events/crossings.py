@@ -27,6 +27,10 @@ from flocsim.state.clock import SERIES
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import NEW, NOW, TRIAL
 
+DEEPEST_OF_OUTLINES = 0.45
+"""Deepest overlap where forces act along outlines, over the smaller spheroradius: at one half, the
+attraction of outlines that are moved apart (rhs/outline_sum.py) has a pole."""
+
 MOST_ITERATIONS = 60
 """Evaluations in the search for one switch."""
 
@@ -51,10 +55,14 @@ def margin_rate(work, state, row):
 
 
 def any_too_deep(scene, work, state):
-    """Return True if a closed pair overlaps past the limit of the contact law in a state."""
+    """Return True if a closed pair overlaps past the limit of the contact law, or of forces along
+    outlines, in a state."""
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         limit = DEEPEST_OVERLAP * (candidate.vertex_radius + candidate.edge_radius)
+        if scene.outlines[0] > 0.0:
+            smaller = min(candidate.vertex_radius, candidate.edge_radius)
+            limit = min(limit, max(DEEPEST_OF_OUTLINES * smaller, scene.outlines[1]))
         if candidate.contact_mode == CLOSED and -work.geometry[state, row].gap > limit:
             return True
     return False
