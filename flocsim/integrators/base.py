@@ -44,8 +44,9 @@ REASONS = {
     Status.STOPPED: "the observer stopped the run",
     Status.STEP_BUDGET: "the step budget ran out: raise integrator.max_steps or the tolerance",
     Status.STALLED: "the step shrank to nothing: the forces change too abruptly for the tolerance",
-    Status.TOO_DEEP: "two bodies overlap by more than half of r_i + r_j, where the contact law has "
-    "lost its meaning: use stiffer contacts, smaller steps or a larger spheroradius",
+    Status.TOO_DEEP: "two bodies overlap too deeply for the contact law (by more than half of "
+    "r_i + r_j), or one has passed through the other: use stiffer contacts, smaller steps or a "
+    "larger spheroradius",
     Status.NO_ROOM: "the list of contact candidates is full",
     Status.RECORD_FULL: "the record is full",
     Status.PAUSED: "the run is paused",
