@@ -50,7 +50,7 @@ SECOND_ORDER = 0.42
 """Share of the term of second order in the coarsest covering that the stated error is at least: the
 two coarser coverings would be extrapolated to so much less, or more, by the leading order alone."""
 
-LEAST_CORRECTION = 0.2
+LEAST_CORRECTION = 0.25
 """Share of the extrapolated part of the loads that the stated error is at least."""
 
 SYMMETRIC_WITHIN = 1e-6
