@@ -202,13 +202,11 @@ class System:
             "water": resistance_of_pairs(self.forces) is not None,
         }
 
-    def scene(
-        self, *, jit: bool = True, laws: Any = None, awaits_touch: bool = False
-    ) -> Scene:  # fmt: skip
+    def scene(self, *, jit: bool = True, laws: Any = None, near: bool = False) -> Scene:
         """Return the bodies as a Scene, with the laws of their forces or with given ``laws``.
 
-        ``awaits_touch``: whether a touch counts even if no force acts there. Raises KernelError for
-        a law that cannot be compiled.
+        ``near``: whether bodies that come near count even if no force acts there. Raises
+        KernelError for a law that cannot be compiled.
         """
         shapes = [body.shape for body in self.bodies]
         pair_table, water = pair_resistance_tables(self.forces, self.bodies, self.fluid)
@@ -216,9 +214,7 @@ class System:
             self.bodies, self.fluid, **of_forces(self.pieces),
             laws=self.laws(jit=jit) if laws is None else laws,
             smoothing=smoothing_of(self.pieces.smoothness, shapes),
-            kicks=kick_parameters(
-                self.forces, self.bodies, self.fluid, awaits_touch=awaits_touch
-            ),
+            kicks=kick_parameters(self.forces, self.bodies, self.fluid, near),
             key=random_key(*self.seed),
             resistances=[resistance_numbers(self.forces, body) for body in self.bodies],
             pair_table=pair_table, water=water,
@@ -447,7 +443,7 @@ class System:
         ``observer`` {hook: replacement} may replace hooks.observe and hooks.awaits_touch;
         ``observed`` is the array that they receive.
         """
-        scene = self.scene(jit=jit, awaits_touch=awaits_touch in (observer or {}))
+        scene = self.scene(jit=jit, near=awaits_touch in (observer or {}))
         return Run(
             self.compose(observer=observer, jit=jit), scene, work_of(scene, *self.motion()),
             self.integrator, until, max_steps=max_steps, observed=observed, record=record,

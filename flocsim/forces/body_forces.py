@@ -142,13 +142,13 @@ def thermal_forces(forces: Iterable[Force]) -> list[Thermal]:
 
 
 def kick_parameters(
-    forces: Sequence[Force], bodies: Sequence[Body], fluid: Fluid, *, awaits_touch: bool = False
+    forces: Sequence[Force], bodies: Sequence[Body], fluid: Fluid, near: bool = False
 ) -> tuple[float, float, float, float]:
     """Return Scene.kicks: duration [s], halvings, relative diffusion [m²/s], least displacement
     [m].
 
-    Zeros without random forces. ``awaits_touch``: whether a touch of the bodies is looked for,
-    whatever acts between them. Raises UsageError for several of them, or for a drag whose
+    Zeros without random forces. ``near``: whether bodies that come near count whatever acts between
+    them, as where a touch is awaited. Raises UsageError for several of them, or for a drag whose
     fluctuations they do not match.
     """
     found = thermal_forces(forces)
@@ -179,7 +179,7 @@ def kick_parameters(
     least, halvings = thermal.least_displacement, 0
     # Halvings after which a kick displaces bodies by no more than ``least``; none where bodies that
     # come near make no difference, unless asked for.
-    near = awaits_touch or not isinstance(thermal.finest, str)
+    near = near or not isinstance(thermal.finest, str)
     near = near or any(not isinstance(force, BodyForce) and not force.absent for force in forces)
     if near and len(bodies) > 1 and relative_diffusion * kick > least**2:
         halvings = min(math.ceil(math.log2(relative_diffusion * kick / least**2)), MOST_HALVINGS)
