@@ -13,8 +13,9 @@ import numpy as np
 
 from benchmarks.reporting import Table, begin
 from flocsim.geometry.shapes.outline import oriented
-from flocsim.hydrodynamics.panels import panels_of, rigid_loads
+from flocsim.hydrodynamics.panels import panels_of
 from flocsim.hydrodynamics.rigid_bodies import mobilities
+from tests.helpers.prisms import loads_of
 
 ALONE = 1.0 / (6.0 * math.pi)
 COVERED = 60
@@ -71,7 +72,7 @@ def exact(rings, middle):
         perimeter = np.hypot(*(np.roll(ring, -1, 0) - ring).T).sum()
         size = math.sqrt((2.0 / 3.0 * perimeter + math.pi) / COVERED)
         surfaces.append(panels_of(oriented([ring - middle]), 4.0 / 3.0, size))
-    return np.linalg.inv(rigid_loads(surfaces)[:, :3])[:2, :2] / ALONE
+    return np.linalg.inv(loads_of(surfaces))[:2, :2] / ALONE
 
 
 def by_sum(places, radii):

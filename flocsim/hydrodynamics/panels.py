@@ -129,50 +129,38 @@ def cuts_of(ring: np.ndarray, size: float, finer: int) -> tuple[np.ndarray, np.n
     return way, np.append(np.concatenate(cuts), way[-1])
 
 
-def rigid_loads(
-    surfaces: Sequence[Panels], bodies: Sequence[int] | None = None,
-    centres: Sequence[Sequence[float]] = ((0.0, 0.0),),
-) -> np.ndarray:  # fmt: skip
-    """Return (3 n, 3 n + 2): forces and torques on n bodies for unit motions and strains, viscosity
-    1.
+def rigid_loads(surface: Panels) -> np.ndarray:
+    """Return (3, 5): force and torque about the origin for unit motions and strains, viscosity 1.
 
-    The columns are v_x, v_y and spin of each body, then E_xx and E_xy. ``bodies``: body of each
-    closed surface, by default all of one; torques and rotations are about their ``centres`` (n,
-    2), the strain about the origin.
+    The columns are v_x, v_y, spin, E_xx and E_xy.
     """
-    middles = np.concatenate([each.middles for each in surfaces])
-    counts = [len(each.middles) for each in surfaces]
-    firsts = np.concatenate([[0], np.cumsum(counts)])
-    matrix = []
-    for each, first in zip(surfaces, firsts[:-1], strict=True):
-        columns = np.zeros((3 * len(middles), 3 * len(each.middles)))
-        add = compiled(add_layers, what="the drag of shapes")
-        add(middles, each.starts, each.frames, each.lengths, each.owners, columns)
-        # A pressure inside of a closed surface moves no water. It is set to 0, as it would be large
-        # by rounding.
-        vectors = np.zeros((len(each.middles), 3))
-        steps = each.lengths[:, None] * each.frames[:, 0]
-        np.add.at(vectors, each.owners, 0.5 * np.cross(each.starts, steps))
-        own = columns[3 * first : 3 * (first + len(each.middles))]
-        own += np.outer((vectors / each.areas[:, None]).ravel(), vectors.ravel())
-        matrix.append(columns)
-    owner = np.repeat(np.zeros(len(surfaces), int) if bodies is None else bodies, counts)
-    x, y, _ = middles.T
-    none = np.zeros(len(middles))
-    motions = []
-    for body, centre in enumerate(centres):
-        own = np.where(owner == body, 1.0, 0.0)
-        motions += [
-            (own, none, none), (none, own, none),
-            (-own * (y - centre[1]), own * (x - centre[0]), none),
-        ]  # fmt: skip
-    # Velocities of the panels for each unit motion and strain; forces follow from the matrix.
-    wanted = np.stack([
-        np.column_stack(each).ravel() for each in (*motions, (x, -y, none), (y, x, none))
-    ], axis=1)  # fmt: skip
-    areas = np.repeat(np.concatenate([each.areas for each in surfaces]), 3)[:, None]
-    found = np.linalg.solve(np.hstack(matrix), wanted)
-    return 2.0 * (areas * wanted[:, : len(motions)]).T @ found
+    x, y, _ = surface.middles.T
+    one, none = np.ones(len(x)), np.zeros(len(x))
+    # Velocities of the panels for each; forces follow from the matrix.
+    motions = [(one, none), (none, one), (-y, x), (x, -y), (y, x)]
+    wanted = np.array([np.column_stack([*each, none]).ravel() for each in motions]).T
+    matrix = layer_of(surface, surface.middles) + inner_pressure(surface)
+    areas = np.repeat(surface.areas, 3)[:, None]
+    return 2.0 * (areas * wanted[:, :3]).T @ np.linalg.solve(matrix, wanted)
+
+
+def layer_of(surface: Panels, points: np.ndarray) -> np.ndarray:
+    """Return the velocities (3 k, 3 n) at points (k, 3) by unit forces per area on n panels."""
+    matrix = np.zeros((3 * len(points), 3 * len(surface.middles)))
+    compiled(add_layers, what="the drag of shapes")(
+        points, surface.starts, surface.frames, surface.lengths, surface.owners, matrix
+    )
+    return matrix
+
+
+def inner_pressure(surface: Panels) -> np.ndarray:
+    """Return what sets the pressure inside of a closed surface to 0, in its matrix (3 n, 3 n).
+
+    It moves no water, so that the matrix leaves it open, and rounding would make it large.
+    """
+    vectors, steps = np.zeros_like(surface.middles), surface.lengths[:, None] * surface.frames[:, 0]
+    np.add.at(vectors, surface.owners, 0.5 * np.cross(surface.starts, steps))
+    return np.outer(vectors / surface.areas[:, None], vectors)
 
 
 def add_layers(middles, starts, frames, lengths, owners, matrix):

@@ -159,7 +159,7 @@ def prism_drag(rings: Sequence[np.ndarray], depth: float | None = None) -> Prism
     unit = [ring / radius - middle for ring in rings]
     perimeter = sum(np.sum(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T)) for ring in unit)
     size = math.sqrt((0.5 * height * perimeter + math.pi) / PANELS)
-    found = np.array([rigid_loads([panels_of(unit, height, size, finer)]) for finer in FINER])
+    found = np.array([rigid_loads(panels_of(unit, height, size, finer)) for finer in FINER])
     found[:, :, :3] = 0.5 * (found[:, :, :3] + found[:, :, :3].swapaxes(1, 2))
     motions = symmetries(unit)
     found = np.mean([each[:3, :3] @ found @ each.T for each in motions], axis=0)

@@ -10,11 +10,12 @@ from flocsim.ensembles.strength.opening import gap_of
 from flocsim.forces import PairResistance, StokesDrag
 from flocsim.geometry.fit.fit import fit_mask
 from flocsim.geometry.shapes.outline import oriented
-from flocsim.hydrodynamics.panels import panels_of, rigid_loads
+from flocsim.hydrodynamics.panels import panels_of
 from flocsim.hydrodynamics.rigid_bodies import ORDERS
 from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.state.work import DAMPING, NOW, work_of
+from tests.helpers.prisms import loads_of
 from tests.helpers.real_images import silhouettes
 
 SIZE = 1e-5
@@ -84,8 +85,8 @@ def boundary_elements(shapes, places):
     size, found = math.sqrt(area / (PANELS * len(shapes))), []
     for finer in (1, 2):
         surfaces = [panels_of(*each, size, finer) for each in zip(outlines, heights, strict=True)]
-        loads = rigid_loads(surfaces, range(len(shapes)), places[:, :2] / SIZE)
-        found.append(0.5 * (loads[:, :-2] + loads[:, :-2].T))
+        loads = loads_of(surfaces, list(range(len(shapes))), places[:, :2] / SIZE)
+        found.append(0.5 * (loads + loads.T))
     coarse, fine = found
     limit = fine + (fine - coarse) / (2.0 ** ORDERS[0] - 1.0)
     powers = np.array([0.0, 0.0, 1.0] * len(shapes))

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from flocsim.hydrodynamics import SpherePair, rigid_bodies
-from flocsim.hydrodynamics.panels import panels_of, rigid_loads
+from flocsim.hydrodynamics.panels import panels_of
 from flocsim.hydrodynamics.rigid_bodies import (
     RIGID_REDUCTION_ACROSS,
     RIGID_REDUCTION_ALONG,
     mobilities,
 )
+from tests.helpers.prisms import loads_of
 from tests.helpers.tiers import rest_slow
 
 RADIUS = 2.0e-6
@@ -41,9 +42,7 @@ def by_boundary_elements(places, count=80):
     middle = np.mean(places, axis=0)
     several, alone = (
         np.linalg.inv(
-            rigid_loads([panels_of([DISC + place - middle], 4.0 / 3.0, size) for place in each])[
-                :, :3
-            ]
+            loads_of([panels_of([DISC + place - middle], 4.0 / 3.0, size) for place in each])
         )[:2, :2]
         / ALONE
         for each in (np.array(places), [middle])
