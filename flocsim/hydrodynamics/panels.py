@@ -181,10 +181,9 @@ def add_layers(middles, starts, frames, lengths, owners, matrix):
                 # ∫ dl/r along the edge, and the solid angle of its triangle with the point below.
                 logarithm = angle = 0.0
                 if square > ON_THE_LINE:
-                    if begin + end < 0.0:
-                        logarithm = math.log((near - begin) / (far - end))
-                    else:
-                        logarithm = math.log((far + end) / (near + begin))
+                    # near + begin and far − end without cancelling.
+                    ahead = near + begin if begin > 0.0 else square / (near - begin)
+                    logarithm = math.log((far + end if end > 0.0 else square / (far - end)) / ahead)
                 above = abs(height)
                 if above > 0.0:
                     a, b = square + above * far, square + above * near

@@ -87,6 +87,15 @@ def test_rounded_corners_leave_a_shape_symmetric():
     assert np.abs(rest - np.diag(np.diag(drag.resistance)) @ np.eye(3, 5)).max() < 1e-9
 
 
+def test_panels_with_their_middle_at_a_vertex_have_finite_loads():
+    """Rounded to so many decimals, the middle is next to a line of an edge and not on it."""
+    for decimals in (7, 9, 11, 13):
+        for count in (16, 28, 40):
+            turn = 2.0 * np.pi * np.arange(count) / count
+            drag = prism_drag([np.round(np.column_stack([np.cos(turn), np.sin(turn)]), decimals)])
+            assert np.isfinite(drag.resistance).all() and drag.error < 0.1
+
+
 def test_a_ring_that_crosses_itself_is_refused():
     with pytest.raises(UsageError, match="not simple"):
         prism_drag([np.array([[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]])])
