@@ -26,11 +26,10 @@ from flocsim.body import Body, Fluid
 from flocsim.constants import BOLTZMANN
 from flocsim.errors import UsageError
 from flocsim.fields import above_zero, check_whole, is_number
-from flocsim.forces.base import ContactForce, Force, PairForce
+from flocsim.forces.base import Force, PairForce
 from flocsim.forces.body_forces import random_key, thermal_forces
 from flocsim.forces.check import kernel_arguments, reach_of
 from flocsim.forces.codegen import laws_of
-from flocsim.forces.contact import Contact
 from flocsim.forces.outline import needs_both_shapes, refuse_outlines
 from flocsim.forces.pair_resistance import Lubrication, PairResistance
 from flocsim.geometry.contact.near_pairs import gap_between
@@ -38,6 +37,7 @@ from flocsim.geometry.shapes.shape import Sphere
 from flocsim.hydrodynamics.pair import SpherePair
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Overdamped
+from flocsim.integrators.loop.kicks import overshoot
 from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.integrators.rhs.views import centre_line
 from flocsim.io.confidence import wilson
@@ -319,16 +319,15 @@ def brownian_meetings(
             f"{far:g} m, found {near:g} m"
         )
     one, other = bodies
-    # Kicks are cut near what a body interacts with. Here a touch ends the run, so that a contact
-    # force has them cut near the other body, and never acts.
-    if not any(isinstance(force, ContactForce) for force in forces):
-        forces = [*forces, Contact()]
     system = System(
         [attrs.evolve(one, position=(0.0, 0.0)), attrs.evolve(other, position=(0.0, near))],
         forces, integrator or Overdamped(), fluid or Fluid(), seed=seed,
     )  # fmt: skip
-    first = system.begin(math.inf, max_steps=max_steps, observer=OBSERVER, jit=jit,
-                         observed=np.array([far]))  # fmt: skip
+    observed = np.array([far])
+    first = system.begin(
+        math.inf, max_steps=max_steps, observer=OBSERVER, jit=jit, observed=observed
+    )  # fmt: skip
+    observed[ESCAPE] -= min(overshoot(first.scene.kicks, far - touch), 0.5 * (far - near))
     codes, times, steps = [], [], 0
     for replicate in range(replicates):
         run = placed(first, near, seed, replicate)

@@ -25,7 +25,8 @@ from flocsim.forces.outline import smoothing_of
 from flocsim.forces.pair_resistance import pair_resistance_tables, resistance_of_pairs
 from flocsim.geometry.contact.near_pairs import SPHERES_ONLY
 from flocsim.geometry.contact.points import overlap_fault
-from flocsim.hooks import HOOKS, compiled_calls, law_table
+from flocsim.geometry.shapes.cores import Parts
+from flocsim.hooks import HOOKS, awaits_touch, compiled_calls, law_table
 from flocsim.integrators.amplification import amplification_of
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
@@ -37,6 +38,10 @@ from flocsim.state.scene import NO_OUTLINES, Scene
 from flocsim.state.work import NOW, copy_of, work_of
 from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory, Watch, watched
+
+DEEP_START = 0.05
+"""Overlap, as a share of r_i + r_j, from which on a start is implausible: contacts are usually
+pressed by 1 % at most."""
 
 Fillings = dict[Callable, Callable]
 """{hook of flocsim.hooks.HOOKS: its replacement}."""
@@ -71,6 +76,22 @@ def check_forces(forces: Iterable[Force]) -> tuple[Force, ...]:
                 f"{force.__name__}(…) with its parameters"
             )
     return forces
+
+
+def check_starts(pairs: Iterable[tuple[int, int, Parts, Parts]], most: float = math.inf) -> None:
+    """Raise UsageError for placed bodies (number, number, parts, parts) that overlap too deeply.
+
+    Warn of the first that overlap more than contacts do. ``most``: largest overlap [m] for forces
+    along outlines.
+    """
+    deep = ""
+    for i, j, a, b in pairs:
+        if fault := overlap_fault(a, b, most):
+            raise UsageError(f"bodies {i} and {j} start {fault}; move them apart")
+        if not deep and (fault := overlap_fault(a, b, most, DEEP_START)):
+            deep = f"bodies {i} and {j} start {fault}: they will be flung apart; move them apart"
+    if deep:
+        warnings.warn(deep, PlausibilityWarning, stacklevel=4)
 
 
 def read_seed(value: Any) -> tuple[int, ...]:
@@ -182,10 +203,11 @@ class System:
             "water": resistance_of_pairs(self.forces) is not None,
         }
 
-    def scene(self, *, jit: bool = True, laws: Any = None) -> Scene:
+    def scene(self, *, jit: bool = True, laws: Any = None, near: bool = False) -> Scene:
         """Return the bodies as a Scene, with the laws of their forces or with given ``laws``.
 
-        Raises KernelError for a law that cannot be compiled.
+        ``near``: whether bodies that come near count even if no force acts there. Raises
+        KernelError for a law that cannot be compiled.
         """
         shapes = [body.shape for body in self.bodies]
         pair_table, water = pair_resistance_tables(self.forces, self.bodies, self.fluid)
@@ -193,7 +215,8 @@ class System:
             self.bodies, self.fluid, **of_forces(self.pieces),
             laws=self.laws(jit=jit) if laws is None else laws,
             smoothing=smoothing_of(self.pieces.smoothness, shapes),
-            kicks=kick_parameters(self.forces, self.bodies, self.fluid), key=random_key(*self.seed),
+            kicks=kick_parameters(self.forces, self.bodies, self.fluid, near),
+            key=random_key(*self.seed),
             resistances=[resistance_numbers(self.forces, body) for body in self.bodies],
             pair_table=pair_table, water=water,
         )  # fmt: skip
@@ -252,23 +275,21 @@ class System:
         return compose(entry, {**calls, **self.fillings(observer)}, jit=jit, what=what)
 
     def check_overlaps(self) -> None:
-        """Raise UsageError if two bodies start with crossing cores or too deep an overlap.
+        """Raise UsageError if two bodies start with crossing cores or too deep an overlap, and warn
+        of a deep one.
 
         With forces along outlines the limit is d_min. Fixed bodies may overlap: they do not
         interact.
         """
         reach, d_min, *_ = self.pieces.outlines
         most = d_min if reach > 0.0 else math.inf
-        for (i, a), (j, b) in combinations(enumerate(self.bodies), 2):
-            if a.fixed and b.fixed:
-                continue
-            fault = overlap_fault(
-                a.shape.placed_parts(*a.position, a.angle),
-                b.shape.placed_parts(*b.position, b.angle),
-                most,
-            )
-            if fault:
-                raise UsageError(f"bodies {i} and {j} start {fault}; move them apart")
+        placed = [each.shape.placed_parts(*each.position, each.angle) for each in self.bodies]
+        pairs = [
+            (i, j, placed[i], placed[j])
+            for i, j in combinations(range(len(placed)), 2)
+            if not (self.bodies[i].fixed and self.bodies[j].fixed)
+        ]
+        check_starts(pairs, most)
 
     def run(
         self, until: float | str, *, max_steps: int = 1_000_000, record: bool = True,
@@ -428,7 +449,7 @@ class System:
         ``observer`` {hook: replacement} may replace hooks.observe and hooks.awaits_touch;
         ``observed`` is the array that they receive.
         """
-        scene = self.scene(jit=jit)
+        scene = self.scene(jit=jit, near=awaits_touch in (observer or {}))
         return Run(
             self.compose(observer=observer, jit=jit), scene, work_of(scene, *self.motion()),
             self.integrator, until, max_steps=max_steps, observed=observed, record=record,

@@ -64,7 +64,7 @@ INNER_ROWS = {
         ["islands", "grouping", "together"],
         ["arrays"],
     ],
-    "hydrodynamics": [["encounters", "rigid_bodies"], ["pair"], ["two_spheres"]],
+    "hydrodynamics": [["encounters", "rigid_bodies"], ["pair"], ["panels", "two_spheres"]],
     "integrators": [
         ["explicit"],
         ["implicit"],

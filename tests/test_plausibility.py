@@ -5,7 +5,7 @@ import warnings
 import attrs
 import pytest
 
-from flocsim import Body, Fluid, Sphere, SpheroPolygon, System
+from flocsim import Body, Fluid, Sphere, SpheroPolygon, Swarm, System
 from flocsim.errors import PlausibilityWarning
 from flocsim.forces import (
     Contact,
@@ -151,3 +151,16 @@ def test_a_run_warns_once_of_each_where_it_is_called():
     assert str(warning.message).startswith("buoyancy is off") and warning.filename == __file__
     with pytest.warns(PlausibilityWarning, match="no contact force"):
         System(PAIR, [StokesDrag()]).run(1e-6, jit=False)
+
+
+@pytest.mark.parametrize("kind", [System, Swarm])
+def test_bodies_that_start_deep_in_each_other_are_doubted(kind):
+    for apart, doubted in ((1.0, True), (1.85, True), (1.995, False)):
+        bodies = [QUARTZ, attrs.evolve(QUARTZ, position=(apart * 5e-6, 0.0))]
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            kind(bodies, [StokesDrag(), Contact()]).run(1e-9)
+        said = [str(each.message) for each in caught if "overlapping" in str(each.message)]
+        assert len(said) == doubted
+        assert all("more than 5 % of r_i + r_j" in line for line in said)
+        assert all(each.filename == __file__ for each in caught)

@@ -1,8 +1,8 @@
-"""The drag of clusters against multiblobs of drawn clusters.
+"""The drag of clusters against boundary elements on drawn clusters.
 
-Clusters are drawn by halves that meet on straight paths in random orientations. Multiblobs: each
-floc is a prism of its outline, 4/3 r_eq deep; numbers are mobilities of clusters over the exact
-ones, less 1, in the mean of all directions and of the two main ones.
+Clusters are drawn by halves that meet on straight paths in random orientations. For boundary
+elements each floc is a prism of its outline, 4/3 r_eq deep; numbers are mobilities of clusters over
+the exact ones, less 1, in the mean of all directions and of the two main ones.
 
     python -m benchmarks.accuracy.cluster_drag [--draws 4]
 """
@@ -12,12 +12,14 @@ import math
 import numpy as np
 
 from benchmarks.reporting import Table, begin
-from flocsim.hydrodynamics import rigid_bodies
+from flocsim.geometry.shapes.outline import oriented
+from flocsim.hydrodynamics.panels import panels_of
 from flocsim.hydrodynamics.rigid_bodies import mobilities
+from tests.helpers.prisms import loads_of
 
 ALONE = 1.0 / (6.0 * math.pi)
 COVERED = 60
-"""Spheres of half of a floc's surface, about."""
+"""Panels of half of a floc's surface, about."""
 
 
 def turned(places, angle):
@@ -64,17 +66,13 @@ def packed(rings, rng):
 
 
 def exact(rings, middle):
-    """The mobility (2, 2) of a rigid cluster at its middle, by multiblobs of one spacing."""
-    spacings = [
-        math.sqrt((2.0 / 3.0 * np.hypot(*(np.roll(r, -1, 0) - r).T).sum() + math.pi) / COVERED)
-        for r in rings
-    ]
-    places = np.concatenate([
-        rigid_bodies.surface([ring - middle], 4.0 / 3.0, spacing)
-        for ring, spacing in zip(rings, spacings, strict=True)
-    ])  # fmt: skip
-    loads = rigid_bodies.rigid_loads(places, rigid_bodies.SPHERE_RADIUS * float(np.mean(spacings)))
-    return np.linalg.inv(loads[:, :3])[:2, :2] / ALONE
+    """The mobility (2, 2) of a rigid cluster at its middle, by boundary elements of one size."""
+    surfaces = []
+    for ring in rings:
+        perimeter = np.hypot(*(np.roll(ring, -1, 0) - ring).T).sum()
+        size = math.sqrt((2.0 / 3.0 * perimeter + math.pi) / COVERED)
+        surfaces.append(panels_of(oriented([ring - middle]), 4.0 / 3.0, size))
+    return np.linalg.inv(loads_of(surfaces))[:2, :2] / ALONE
 
 
 def by_sum(places, radii):
@@ -89,7 +87,7 @@ def main():
     """Print how wrong the sum is for drawn clusters."""
     arguments = begin(__doc__, draws=4)
     draws = 1 if arguments.quick else arguments.draws
-    table = Table("Mobility of drawn clusters over that of multiblobs, less 1", (
+    table = Table("Mobility of drawn clusters over that by boundary elements, less 1", (
         "flocs", "mean of directions", "slow direction", "fast direction", "largest",
     ))  # fmt: skip
     for count in (2, 3, 4) if arguments.quick else (2, 3, 4, 8, 16, 32):

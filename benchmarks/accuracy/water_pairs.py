@@ -1,5 +1,5 @@
-"""Two real flocs in water, by `[forces.hydrodynamics]` and the drag of their shape, against rigid
-multiblobs of both: by how much how fast they move is off.
+"""Two real flocs in water, by `[forces.hydrodynamics]` and the drag of their shape, against
+boundary elements on both: by how much how fast they move is off.
 
 python -m benchmarks.accuracy.water_pairs [--quick] [--markdown] [--images DIR]
 """
@@ -12,8 +12,8 @@ from benchmarks.pictures import PICTURES, checked, silhouettes
 from benchmarks.reporting import Table, begin
 from tests.helpers.real_pairs import (
     Resistance,
+    boundary_elements,
     line_mobilities,
-    multiblobs,
     random_pair,
     real_flocs,
     settling,
@@ -28,7 +28,7 @@ MOTIONS = "together, along", "across", "against, along", "across", "settling"
 def differences(shapes, places):
     """Of the mobilities along and across the line of centres, together and against each other (4,),
     and the larger of both bodies' velocities, over the faster speed, in the worst direction."""
-    found, exact = Resistance(shapes)(places), multiblobs(shapes, places)
+    found, exact = Resistance(shapes)(places), boundary_elements(shapes, places)
     lines = line_mobilities(found, places) / line_mobilities(exact, places) - 1.0
     ours, theirs = settling(found, shapes), settling(exact, shapes)
     speed = np.linalg.norm(theirs, axis=2).max(axis=1)

@@ -142,12 +142,13 @@ def thermal_forces(forces: Iterable[Force]) -> list[Thermal]:
 
 
 def kick_parameters(
-    forces: Sequence[Force], bodies: Sequence[Body], fluid: Fluid
+    forces: Sequence[Force], bodies: Sequence[Body], fluid: Fluid, near: bool = False
 ) -> tuple[float, float, float, float]:
     """Return Scene.kicks: duration [s], halvings, relative diffusion [m²/s], least displacement
     [m].
 
-    Zeros without random forces. Raises UsageError for several of them, or for a drag whose
+    Zeros without random forces. ``near``: whether bodies that come near count whatever acts between
+    them, as where a touch is awaited. Raises UsageError for several of them, or for a drag whose
     fluctuations they do not match.
     """
     found = thermal_forces(forces)
@@ -176,10 +177,11 @@ def kick_parameters(
     if kick == "auto":
         kick = (KICK_DISPLACEMENT * radii[0]) ** 2 / relative_diffusion
     least, halvings = thermal.least_displacement, 0
-    pairs = any(not isinstance(force, BodyForce) and not force.absent for force in forces)
-    # Halvings after which a kick displaces bodies by no more than ``least``; none without
-    # interactions.
-    if pairs and len(bodies) > 1 and relative_diffusion * kick > least**2:
+    # Halvings after which a kick displaces bodies by no more than ``least``; none where bodies that
+    # come near make no difference, unless asked for.
+    near = near or not isinstance(thermal.finest, str)
+    near = near or any(not isinstance(force, BodyForce) and not force.absent for force in forces)
+    if near and len(bodies) > 1 and relative_diffusion * kick > least**2:
         halvings = min(math.ceil(math.log2(relative_diffusion * kick / least**2)), MOST_HALVINGS)
     return float(kick), float(halvings), float(relative_diffusion), least if halvings else 0.0
 

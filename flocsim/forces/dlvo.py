@@ -107,11 +107,12 @@ class VanDerWaals(PairForce):
     def reach(self) -> float:
         """Gap [m] at which the attraction becomes negligible, or ``cut`` if that is smaller.
 
-        Plates (law "outline") decay as d⁻³, spheres as d⁻².
+        Plates (law "outline") decay as d⁻³, spheres as d⁻². What is left out beyond a gap does not
+        depend on d_min, so that one below MINIMUM_GAP does not shorten the reach.
         """
         # (d/d_min)^−n equals NEGLIGIBLE_FORCE, n = 3 for plates and 2 for spheres.
         power = 1.0 / 3.0 if self.law == "outline" else 0.5
-        return smaller_reach(self.cut, self.d_min / NEGLIGIBLE_FORCE**power)
+        return smaller_reach(self.cut, max(self.d_min, MINIMUM_GAP) / NEGLIGIBLE_FORCE**power)
 
     @property
     def absent(self) -> str:

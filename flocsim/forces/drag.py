@@ -1,6 +1,6 @@
 """Drag on each body: Stokes, Schiller and Naumann (finite Reynolds number), or that of its shape.
 
-The resistance of a shape is computed once by a rigid multiblob (flocsim.hydrodynamics.prism_drag)
+The resistance of a shape is computed once by boundary elements (flocsim.hydrodynamics.prism_drag)
 and stored on disk. Equations and sources stand in StokesDrag.
 """
 
@@ -20,9 +20,9 @@ from flocsim.compiler.processor import cpu_kind, versions
 from flocsim.errors import RangeError, UsageError
 from flocsim.fields import choice, flag, quantity
 from flocsim.forces.base import BodyForce, Force
-from flocsim.geometry.shapes import cores
+from flocsim.geometry.shapes import cores, outline
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.hydrodynamics import rigid_bodies
+from flocsim.hydrodynamics import panels, rigid_bodies
 from flocsim.hydrodynamics.rigid_bodies import drag_factor, turning_factor
 from flocsim.state.bodies import RESISTANCE_COLUMNS
 
@@ -369,12 +369,12 @@ def outline_bytes(shape: Shape) -> tuple[bytes, ...]:
 
 
 @functools.lru_cache(maxsize=4096)
-def unit_resistance(outline: tuple[bytes, ...], height: float) -> tuple[float, ...]:
+def unit_resistance(ring_bytes: tuple[bytes, ...], height: float) -> tuple[float, ...]:
     """Return the twelve numbers for an outline with r_eq = 1, from disk if they are stored
     there."""
 
     def make() -> bytes:
-        rings = [np.frombuffer(ring).reshape(-1, 2) for ring in outline]
+        rings = [np.frombuffer(ring).reshape(-1, 2) for ring in ring_bytes]
         drag = rigid_bodies.prism_drag(rings, height)
         r = drag.resistance
         # A resistance with a negative eigenvalue would drive a body instead of braking it.
@@ -387,8 +387,9 @@ def unit_resistance(outline: tuple[bytes, ...], height: float) -> tuple[float, .
         numbers = [r[0, 0], r[0, 1], r[1, 1], r[0, 2], r[1, 2], r[2, 2], *drag.strain.T.ravel()]
         return np.array(numbers, dtype=float).tobytes()
 
-    digest = hashlib.blake2b(b"|".join(outline), digest_size=32).hexdigest()
-    data = kept("flocsim_drag", f"{digest} {height} {computation_key(rigid_bodies, cores)}", make)
+    digest = hashlib.blake2b(b"|".join(ring_bytes), digest_size=32).hexdigest()
+    key = computation_key(rigid_bodies, panels, outline, cores)
+    data = kept("flocsim_drag", f"{digest} {height} {key}", make)
     return tuple(np.frombuffer(data).tolist())
 
 

@@ -1,13 +1,8 @@
 """Drag of rigid bodies in slow flow: a floc's outline, permeable spheres, clusters of bodies.
 
-**Prism.** A prism of the outline is covered by small spheres that move as one rigid body. Their
-mobility is the Rotne–Prager–Yamakawa tensor; the forces on them follow from one linear system
-(rigid multiblob). Because the spheres protrude from the surface, the body is too large by a share
-of their spacing. Three spacings are extrapolated to zero, which also estimates the error. Motion is
-in the plane, so half of the surface suffices.
-
-Sources: H. Yamakawa (1970), J. Chem. Phys. 53, 436 (with overlaps: E. Wajnryb et al. 2013, J. Fluid
-Mech. 731, R3); S. Delong et al. (2015), Commun. Appl. Math. Comput. Sci. 11, 217.
+**Prism.** The surface of a prism of the outline is divided into flat panels with a constant force
+on each (flocsim.hydrodynamics.panels). Three sizes of panels are extrapolated to zero, which also
+estimates the error. Loads are averaged over the motions that bring the outline onto itself.
 
 **Permeable sphere.** Brinkman's equation inside a sphere of radius a and permeability k, Stokes's
 outside; β = a/√k.
@@ -32,28 +27,35 @@ Onishi (1984), J. Fluid Mech. 139, 261.
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.compiler.composer import compiled
 from flocsim.errors import UsageError
-from flocsim.geometry.shapes.cores import inside_polygon, inside_rings, signed_area
+from flocsim.geometry.shapes.cores import signed_area
+from flocsim.geometry.shapes.outline import oriented, require_simple
+from flocsim.hydrodynamics.panels import panels_of, rigid_loads
 
-SPHERES = (150, 300, 600)
-"""Approximate numbers of spheres on half of the surface: three coverings for the extrapolation."""
+PANELS, FINER = 24, (1, 2, 4)
+"""Approximate number of panels on half of the surface, and into how many each is divided, in both
+directions, in three coverings."""
 
-SPHERE_RADIUS = 0.5
-"""Radius of a sphere over their spacing."""
+ORDERS = 1.09, 2.0
+"""Powers of the size of panels in the error of the loads. The force is singular at edges, as their
+distance to the power −.4555 at those of 90° (Moffatt 1964, J. Fluid Mech. 18, 1), so that the error
+of the leading order is 2 (1 − .4555)."""
 
-LEAST_FACE_DISTANCE = 0.6
-"""Smallest distance of spheres on the faces from those of the wall, in spacings."""
+SECOND_ORDER = 0.42
+"""Share of the term of second order in the coarsest covering that the stated error is at least: the
+two coarser coverings would be extrapolated to so much less, or more, by the leading order alone."""
 
+LEAST_CORRECTION = 0.25
+"""Share of the extrapolated part of the loads that the stated error is at least."""
 
-GRID_ROTATION = np.array([[math.cos(0.3), math.sin(0.3)], [-math.sin(0.3), math.cos(0.3)]])
-"""Rotation of the grid on a face, so that its rows are parallel to no straight side, where the
-distance of the first row would matter."""
+SYMMETRIC_WITHIN = 1e-6
+"""Distance, in r_eq, within which vertices of an outline have to lie on others once it is turned or
+mirrored."""
 
 ALL_PAIRS_UP_TO = 100
 """Number of bodies up to which all pairs of a cluster interact individually."""
@@ -82,7 +84,8 @@ class PrismDrag:
     strain : (3, 2) array
         Γ [m², m³] for E_xx = −E_yy and E_xy.
     error : float
-        Relative error estimate.
+        Error estimate of any element of R over √(R_ii R_jj), and of Γ, where spin stands for a
+        strain.
     radius : float
         r_eq of the outline [m].
 
@@ -136,133 +139,72 @@ def prism_drag(rings: Sequence[np.ndarray], depth: float | None = None) -> Prism
     Raises
     ------
     UsageError
-        If the rings enclose no area, or the depth is not positive.
+        If the rings enclose no area or cross themselves, or the depth is not positive.
 
     Notes
     -----
-    Rigid multiblob; sources at the top of the module. Three coverings are extrapolated to zero
-    spacing.
+    Boundary elements (flocsim.hydrodynamics.panels), in three sizes that are extrapolated to zero.
     """
-    rings = [np.asarray(ring, dtype=float) for ring in rings]
-    rings = [ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring for ring in rings]
-    # Nested rings: an odd level of nesting is a hole.
-    nested = [sum(inside_polygon(ring[:1], each)[0] for each in rings if each is not ring)
-              for ring in rings]  # fmt: skip
-    area = sum(abs(signed_area(ring)) * (-1.0) ** level
-               for ring, level in zip(rings, nested, strict=True))  # fmt: skip
-    if not 0.0 < area < math.inf:
+    if not 0.0 < (area := sum(abs(signed_area(np.asarray(ring))) for ring in rings)) < math.inf:
         raise UsageError(f"an outline must hold an area above 0 m^2, found {area:.3g}")
-    radius = math.sqrt(area / math.pi)
+    for ring in rings:
+        require_simple(ring)
+    rings = oriented(rings)
+    radius = math.sqrt(sum(map(signed_area, rings)) / math.pi)
     height = 4.0 / 3.0 if depth is None else depth / radius
     if not 0.0 < height < math.inf:
         raise UsageError(f"the depth of a prism must be above 0 m, found {depth!r}")
-    unit = [ring / radius for ring in rings]
-    spacings, found = [], []
+    # In units of r_eq about the middle of the vertices.
+    middle = rings[0].mean(axis=0) / radius
+    unit = [ring / radius - middle for ring in rings]
     perimeter = sum(np.sum(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T)) for ring in unit)
-    # Three coverings in units of r_eq, with spacings h ∝ count^(−1/2).
-    for count in SPHERES:
-        spacings.append(math.sqrt((0.5 * height * perimeter + math.pi) / count))
-        found.append(rigid_loads(surface(unit, height, spacings[-1]), SPHERE_RADIUS * spacings[-1]))
-    # The error is linear in h: fit lines and take their values at h = 0. Lines through two of the
-    # points give the error estimate.
-    spacing, values = np.array(spacings), np.reshape(found, (len(found), -1))
-    lines = [np.polyfit(spacing[use], values[use], 1)[1] for use in ([0, 1, 2], [0, 1], [1, 2])]
-    last, *others = (each.reshape(found[0].shape) for each in lines)
-    error = max(np.max(np.abs(np.diag(each) / np.diag(last) - 1.0)) for each in others)
-    powers = np.array([1.0, 1.0, 2.0])
-    # Scale back to the size of the outline: R_ij and Γ_ij carry different powers of length.
-    grown = radius ** (powers[:, None] + np.array([1.0, 1.0, 2.0, 2.0, 2.0]) - 1.0)
-    whole = last * grown
-    resistance = 0.5 * (whole[:, :3] + whole[:, :3].T)
-    return PrismDrag(resistance, whole[:, 3:], float(error), radius)
+    size = math.sqrt((0.5 * height * perimeter + math.pi) / PANELS)
+    found = np.array([rigid_loads(panels_of(unit, height, size, finer)) for finer in FINER])
+    found[:, :, :3] = 0.5 * (found[:, :, :3] + found[:, :, :3].swapaxes(1, 2))
+    motions = symmetries(unit)
+    found = np.mean([each[:3, :3] @ found @ each.T for each in motions], axis=0)
+    # Extrapolated to panels of no size.
+    terms = np.array([[1.0, *(finer**-order for order in ORDERS)] for finer in FINER])
+    last, _, second = np.tensordot(np.linalg.inv(terms), found, 1)
+    # Errors of elements over those of the diagonal; strains go with the spin.
+    scale = np.sqrt(np.diag(last[:, :3]))
+    differences = SECOND_ORDER * second, LEAST_CORRECTION * (found[-1] - last)
+    error = np.max(np.abs(differences) / (scale[:, None] * scale[[0, 1, 2, 2, 2]]))
+    # About the origin, and of the outline's size: R_ij and Γ_ij carry different powers of length.
+    x, y = middle
+    shift = np.eye(5)
+    shift[:2, 2:] = [[-y, x, y], [x, -y, x]]
+    powers = np.array([1.0, 1.0, 2.0, 2.0, 2.0])
+    whole = shift[:3, :3].T @ last @ shift * radius ** (powers[:3, None] + powers - 1.0)
+    return PrismDrag(whole[:, :3], whole[:, 3:], float(error), radius)
 
 
-def surface(rings: Sequence[np.ndarray], height: float, spacing: float) -> np.ndarray:
-    """Return positions (k, 3) of spheres that cover the upper half of a prism: its wall, and a
-    face."""
-    walls = [along(ring, spacing) for ring in rings]
-    # An even number of layers: none lies in the mid-plane.
-    layers = 2 * max(1, round((height / spacing + 1.0) / 2.0))
-    levels = np.linspace(-0.5 * height, 0.5 * height, layers)[layers // 2 :]
-    wall = np.concatenate(walls)
-    middle = wall.mean(axis=0)
-    reach = float(np.max(np.hypot(*(wall - middle).T))) + spacing
-    # Hexagonal grid on the face.
-    rows = np.arange(-reach, reach, spacing * math.sqrt(0.75))
-    columns = np.arange(-reach, reach, spacing)
-    shift = 0.5 * spacing * (np.arange(len(rows)) % 2)
-    grid = np.column_stack([(columns + shift[:, None]).ravel(), np.repeat(rows, len(columns))])
-    grid = middle + grid @ GRID_ROTATION
-    grid = grid[inside_rings(grid, rings)]
-    # The wall spheres are dense, so their distance approximates that from the outline.
-    gap = np.min(np.hypot(*(grid[:, None] - wall).T), axis=0) if len(grid) else np.empty(0)
-    grid = grid[gap > LEAST_FACE_DISTANCE * spacing]
-    return np.concatenate([
-        np.column_stack([places, np.full(len(places), level)])
-        for places, level in [*((wall, level) for level in levels), (grid, 0.5 * height)]
-    ])  # fmt: skip
+def symmetries(rings: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return the motions that bring an outline about the origin onto itself, the identity first.
 
-
-def along(ring: np.ndarray, spacing: float) -> np.ndarray:
-    """Return evenly spaced points of a ring."""
-    closed = np.vstack([ring, ring[:1]])
-    way = np.append(0.0, np.cumsum(np.hypot(*np.diff(closed, axis=0).T)))
-    count = max(3, round(way[-1] / spacing))
-    places = (np.arange(count) + 0.5) * way[-1] / count
-    return np.column_stack([np.interp(places, way, axis) for axis in closed.T])
-
-
-def mobility_tensors(places: np.ndarray, others: np.ndarray, radius: float) -> np.ndarray:
-    """Return the mobility tensors (k, m, 3, 3) of equal spheres at unit viscosity (RPY)."""
-    apart = places[:, None] - others
-    distance = np.linalg.norm(apart, axis=2)
-    r = np.maximum(distance, 1e-9 * radius)
-    outside = distance >= 2.0 * radius
-    # Coefficients of the identity and of r r, for separate and for overlapping spheres.
-    identity_part = np.where(
-        outside, (1.0 + 2.0 * radius**2 / (3.0 * r**2)) / (8.0 * math.pi * r),
-        (1.0 - 9.0 * r / (32.0 * radius)) / (6.0 * math.pi * radius),
-    )  # fmt: skip
-    outer_part = np.where(
-        outside, (1.0 - 2.0 * radius**2 / r**2) / (8.0 * math.pi * r**3),
-        3.0 / (32.0 * radius * r) / (6.0 * math.pi * radius),
-    )  # fmt: skip
-    tensors = (outer_part[..., None] * apart)[..., None] * apart[..., None, :]
-    tensors[..., range(3), range(3)] += identity_part[..., None]
-    return tensors
-
-
-def rigid_loads(
-    places: np.ndarray, radius: float, bodies: Any = None, centres: Any = ((0.0, 0.0),)
-) -> np.ndarray:
-    """Return (3 n, 3 n + 2): forces and torques on n bodies for unit motions and strains, viscosity
-    1.
-
-    The columns are v_x, v_y and spin of each body, then E_xx and E_xy. ``bodies`` (k,): body of
-    each sphere, by default all of one; torques and rotations are about their ``centres`` (n, 2),
-    the strain about the origin.
+    Each as a matrix (5, 5) of (v_x, v_y, spin, E_xx, E_xy).
     """
-    from scipy.linalg import cho_factor, cho_solve
+    from scipy.linalg import block_diag
+    from scipy.spatial import KDTree
 
-    count, mirror = len(places), np.array([1.0, 1.0, -1.0])
-    matrix: Any = mobility_tensors(places, places, radius)
-    # Mirror images below the mid-plane move alike in the plane.
-    matrix += mobility_tensors(places, places * mirror, radius) * mirror
-    matrix = np.moveaxis(matrix, 2, 1).reshape(3 * count, 3 * count)
-    x, y, _ = places.T
-    none = np.zeros(count)
-    motions = []
-    for body, centre in enumerate(centres):
-        own = np.ones(count) if bodies is None else np.where(bodies == body, 1.0, 0.0)
-        motions += [
-            (own, none, none), (none, own, none),
-            (-own * (y - centre[1]), own * (x - centre[0]), none),
-        ]  # fmt: skip
-    whole = [*motions, (x, -y, none), (y, x, none)]
-    # Velocities of the spheres for each unit motion; forces follow from the mobility matrix.
-    wanted = np.stack([np.column_stack(each).ravel() for each in whole], axis=1)
-    found = cho_solve(cho_factor(matrix, overwrite_a=True), wanted)
-    return 2.0 * wanted[:, : len(motions)].T @ found
+    points, tree = np.concatenate(rings), KDTree(np.concatenate(rings))
+    first, found = rings[0] @ [1.0, 1j], []
+    for sign in (1.0, -1.0):
+        # Mirrored at the x-axis, the outline runs the other way.
+        image = first if sign > 0.0 else np.conj(first)[::-1]
+        for shift in range(len(first)):
+            turn = np.vdot(image, np.roll(first, shift))
+            turn /= abs(turn) or 1.0
+            if np.max(np.abs(turn * image - np.roll(first, shift))) > SYMMETRIC_WITHIN:
+                continue
+            # A strain turns by twice the angle.
+            plane, strain = (
+                np.array([[z.real, -z.imag], [z.imag, z.real]]) * [1.0, sign]
+                for z in (turn, turn * turn)
+            )
+            if np.max(tree.query(points @ plane.T)[0]) < SYMMETRIC_WITHIN:
+                found.append(block_diag(plane, sign, strain))
+    return found
 
 
 SMALL_BETA = 1e-2

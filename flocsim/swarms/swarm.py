@@ -18,7 +18,7 @@ from flocsim.forces.body_forces import kick_parameters
 from flocsim.forces.drag import shields_clusters
 from flocsim.forces.outline import refuse_outlines
 from flocsim.forces.pair_resistance import refuse_pair_resistance
-from flocsim.geometry.contact.points import PERIODIC, overlap_fault
+from flocsim.geometry.contact.points import PERIODIC
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import observe
 from flocsim.integrators.base import Integrator, Status
@@ -33,7 +33,7 @@ from flocsim.swarms.progress import Effort, Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
 from flocsim.swarms.together.bonds import BondGauge, Bonds
 from flocsim.swarms.together.clusters import Clusters, Gauge, Neighbours, Shielding
-from flocsim.system import System, check_bodies, check_forces, read_seed
+from flocsim.system import System, check_bodies, check_forces, check_starts, read_seed
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -280,19 +280,18 @@ class Swarm:
                 raise UsageError(FLOW_ADVICE.format(axis=axis))
 
     def check_overlaps(self, gauge: Gauge) -> None:
-        """Raise UsageError if two bodies start with crossing cores or too deep an overlap.
+        """Raise UsageError if two bodies start with crossing cores or too deep an overlap, and warn
+        of a deep one.
 
         Two fixed bodies may overlap.
         """
         position, _ = self.system.motion()
         near = gauge.neighbours(position)
-        for (i, j), vector in zip(near.pairs.tolist(), near.vector, strict=True):
-            a, b = self.bodies[i], self.bodies[j]
-            fault = overlap_fault(
-                a.shape.placed_parts(*vector, a.angle), b.shape.placed_parts(0.0, 0.0, b.angle)
-            )
-            if fault:
-                raise UsageError(f"bodies {j} and {i} start {fault}; move them apart")
+        check_starts(
+            (j, i, self.bodies[i].shape.placed_parts(*vector, self.bodies[i].angle),
+             self.bodies[j].shape.placed_parts(0.0, 0.0, self.bodies[j].angle))
+            for (i, j), vector in zip(near.pairs.tolist(), near.vector, strict=True)
+        )  # fmt: skip
 
     def begin(
         self, until: float, *, threads: int = 1, max_steps: int = MOST_STEPS,

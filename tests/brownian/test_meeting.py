@@ -5,15 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from flocsim import Body, Fluid, Sphere, SpheroPolygon
+from flocsim import Body, Fluid, Sphere, SpheroPolygon, System
 from flocsim.brownian import brownian_meetings, splitting_probability
-from flocsim.errors import UsageError
+from flocsim.errors import PlausibilityWarning, UsageError
 from flocsim.forces import Contact, DoubleLayer, StokesDrag, Thermal, VanDerWaals
+from flocsim.integrators import Overdamped
 
 WATER = Fluid(viscosity=0.89e-3)
 HALF = Body(Sphere(0.5e-6), density=1050.0)
-SHIFT = 0.5826
-"""−ζ(½)/√(2π): by so much of √(2Dτ) paths in steps of τ see absorbing surfaces further away."""
 
 
 def kick_of(way):
@@ -83,4 +82,29 @@ def test_meetings_without_a_pair_force_touch_as_those_with_one_that_never_acts()
         brownian_meetings([HALF, HALF], forces, 1.3e-6, 2.5e-6, 20, seed=3, fluid=WATER)
         for forces in (alone, [*alone, Contact()])
     )
-    assert first.steps == second.steps and np.array_equal(first.times, second.times)
+    assert first.steps == second.steps and first.touched == second.touched
+    np.testing.assert_allclose(first.times, second.times, rtol=1e-4)
+
+
+@pytest.mark.slow
+def test_paths_in_kicks_escape_where_brownian_paths_do():
+    """Near the release, where what a path does within a kick counts most."""
+    forces = [Thermal(), StokesDrag()]
+    wanted = splitting_probability([], (0.5e-6, 0.5e-6), 1.25e-6, 1.45e-6, fluid=WATER)
+    found = brownian_meetings([HALF, HALF], forces, 1.25e-6, 1.45e-6, 8000, seed=2, fluid=WATER)
+    low, high = found.interval(0.999)
+    assert low <= wanted <= high
+
+
+def steps_of(**kicks):
+    """The steps that two bodies take that diffuse at a gap of a twentieth of their radius, without
+    any force between them."""
+    other = Body(Sphere(0.5e-6), (1.025e-6, 0.0), density=1050.0)
+    system = System([HALF, other], [StokesDrag(), Thermal(**kicks)], Overdamped(), WATER, seed=1)
+    with pytest.warns(PlausibilityWarning, match="no contact force"):
+        return len(system.run(2e-3, jit=False).position)
+
+
+def test_kicks_are_cut_near_another_body_where_that_is_asked_for():
+    kick = kick_of(5e-8)
+    assert steps_of(kick=kick, finest=1e-8) > 3 * steps_of(kick=kick)

@@ -1,10 +1,11 @@
-"""The double layer between unlike bodies."""
+"""The double layer between unlike bodies, and how far attraction reaches."""
 
+import numpy as np
 import pytest
 
 from flocsim import Body, Sphere, System
 from flocsim.errors import RangeError, UsageError
-from flocsim.forces import DoubleLayer
+from flocsim.forces import DoubleLayer, VanDerWaals
 
 
 def test_unlike_bodies_have_the_product_of_their_potentials():
@@ -28,3 +29,19 @@ def test_more_than_two_bodies_have_one_potential():
     System(bodies[:2], [force])
     with pytest.raises(UsageError, match="is for two bodies, found 3 bodies"):
         System(bodies, [force])
+
+
+@pytest.mark.parametrize("law", ["spheres", "outline"])
+def test_attraction_ends_where_it_does_whatever_its_least_gap(law):
+    """The law beyond d_min does not depend on it; neither does what is left out of it."""
+    reaches = [VanDerWaals(d_min=each, law=law).reach for each in (1e-11, 3e-10, 1e-9, 2e-9)]
+    assert reaches[0] == reaches[1] == reaches[2] < reaches[3]
+
+
+def test_the_attraction_left_out_is_little_beside_weight_and_thermal_energy():
+    for radius, hamaker in ((1e-6, 4.7e-20), (1e-5, 4.7e-20), (1e-5, 1e-18)):
+        force = VanDerWaals(hamaker, d_min=1e-10)
+        gap, reduced = force.reach, 0.5 * radius
+        rest = hamaker * reduced / (6.0 * gap**2)
+        weight = 4.0 / 3.0 * np.pi * radius**3 * 1650.0 * 9.81
+        assert rest < 1e-4 * weight

@@ -16,8 +16,8 @@ from tests.helpers.fast_scene import FastScene
 from tests.helpers.real_pairs import (
     SIZE,
     Resistance,
+    boundary_elements,
     line_mobilities,
-    multiblobs,
     pose,
     random_pair,
     real_flocs,
@@ -161,13 +161,13 @@ def test_no_motion_of_two_real_flocs_gets_work_back_in_any_of_many_poses(law):
     assert least_of_real_pairs(25, 2_000, law, jit=True) > 0.2
 
 
-def check_against_multiblobs(pairs, gap):
+def check_against_boundary_elements(pairs, gap):
     """How fast two real flocs move, within 10 % but for the rate of their gap, and 13 % where they
     slide past each other so near."""
     rng, flocs = np.random.default_rng(1), real_flocs(16)
     for _ in range(pairs):
         shapes, places = random_pair(rng, flocs, gap)
-        found, exact = Resistance(shapes)(places), multiblobs(shapes, places)
+        found, exact = Resistance(shapes)(places), boundary_elements(shapes, places)
         lines = line_mobilities(found, places) / line_mobilities(exact, places)
         np.testing.assert_allclose(lines[:2], 1.0, atol=0.1)
         assert abs(lines[3] - 1.0) < (0.1 if gap >= 0.5 else 0.13)
@@ -179,14 +179,14 @@ def check_against_multiblobs(pairs, gap):
 
 
 @pytest.mark.parametrize("gap", rest_slow([0.25, 1.0], lambda gap: gap == 1.0))
-def test_two_real_flocs_move_as_rigid_multiblobs_do(gap):
-    check_against_multiblobs(3, gap)
+def test_two_real_flocs_move_as_boundary_elements_do(gap):
+    check_against_boundary_elements(3, gap)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("gap", [0.25, 0.5, 1.0, 3.0])
-def test_twenty_pairs_of_real_flocs_move_as_rigid_multiblobs_do(gap):
-    check_against_multiblobs(20, gap)
+def test_twenty_pairs_of_real_flocs_move_as_boundary_elements_do(gap):
+    check_against_boundary_elements(20, gap)
 
 
 def test_turned_mirrored_and_exchanged_bodies_feel_the_same():

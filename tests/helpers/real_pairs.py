@@ -1,4 +1,4 @@
-"""Pairs of real flocs in water: rigid multiblobs of both, and what the engine makes of them."""
+"""Pairs of real flocs in water: boundary elements on both, and what the engine makes of them."""
 
 import math
 from functools import cache
@@ -9,10 +9,13 @@ from flocsim import Body, Fluid, SpheroPolygon, System
 from flocsim.ensembles.strength.opening import gap_of
 from flocsim.forces import PairResistance, StokesDrag
 from flocsim.geometry.fit.fit import fit_mask
-from flocsim.hydrodynamics import rigid_bodies
+from flocsim.geometry.shapes.outline import oriented
+from flocsim.hydrodynamics.panels import panels_of
+from flocsim.hydrodynamics.rigid_bodies import ORDERS
 from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.state.work import DAMPING, NOW, work_of
+from tests.helpers.prisms import loads_of
 from tests.helpers.real_images import silhouettes
 
 SIZE = 1e-5
@@ -20,8 +23,8 @@ SIZE = 1e-5
 
 UNIT = Fluid(viscosity=1.0)
 
-COVERINGS = 150, 300
-"""Spheres on half of the surface of each body: two coverings, and their limit."""
+PANELS = 60
+"""Panels on half of the surface of each body, about; once more with four times as many."""
 
 
 @cache
@@ -70,29 +73,22 @@ def rings_of(shape, place):
     return [(ring[:-1] @ [[c, s], [-s, c]] + place[:2]) / SIZE for ring in shape.outline()]
 
 
-def multiblobs(shapes, places):
+def boundary_elements(shapes, places):
     """(6, 6) resistance of prisms 4/3 r_eq deep, viscosity 1."""
-    outlines = [rings_of(*each) for each in zip(shapes, places, strict=True)]
+    outlines = [oriented(rings_of(*each)) for each in zip(shapes, places, strict=True)]
     heights = [4.0 / 3.0 * shape.equivalent_radius / SIZE for shape in shapes]
     area = sum(
         0.5 * height * sum(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).sum() for ring in rings)
         + math.pi * (0.75 * height) ** 2
         for rings, height in zip(outlines, heights, strict=True)
     )
-    spacings, found = [], []
-    for count in COVERINGS:
-        spacing = math.sqrt(area / (count * len(shapes)))
-        blobs = [
-            rigid_bodies.surface(*each, spacing) for each in zip(outlines, heights, strict=True)
-        ]
-        owner = np.repeat(range(len(shapes)), [len(each) for each in blobs])
-        loads = rigid_bodies.rigid_loads(
-            np.concatenate(blobs), rigid_bodies.SPHERE_RADIUS * spacing, owner, places[:, :2] / SIZE
-        )
-        spacings.append(spacing)
-        found.append(0.5 * (loads[:, :-2] + loads[:, :-2].T))
-    wide, fine = spacings
-    limit = found[1] + (found[1] - found[0]) * fine / (wide - fine)
+    size, found = math.sqrt(area / (PANELS * len(shapes))), []
+    for finer in (1, 2):
+        surfaces = [panels_of(*each, size, finer) for each in zip(outlines, heights, strict=True)]
+        loads = loads_of(surfaces, list(range(len(shapes))), places[:, :2] / SIZE)
+        found.append(0.5 * (loads + loads.T))
+    coarse, fine = found
+    limit = fine + (fine - coarse) / (2.0 ** ORDERS[0] - 1.0)
     powers = np.array([0.0, 0.0, 1.0] * len(shapes))
     return limit * SIZE ** (1.0 + powers[:, None] + powers)
 

@@ -1,14 +1,16 @@
-"""How clusters move through slow flow: exact pairs, multiblobs, and what no numbering changes."""
+"""How clusters move through slow flow: pairs, boundary elements, and what no numbering changes."""
 
 import numpy as np
 import pytest
 
 from flocsim.hydrodynamics import SpherePair, rigid_bodies
+from flocsim.hydrodynamics.panels import panels_of
 from flocsim.hydrodynamics.rigid_bodies import (
     RIGID_REDUCTION_ACROSS,
     RIGID_REDUCTION_ALONG,
     mobilities,
 )
+from tests.helpers.prisms import loads_of
 from tests.helpers.tiers import rest_slow
 
 RADIUS = 2.0e-6
@@ -34,18 +36,16 @@ def mobility(places, radii=None):
     return np.array([[xx, xy], [xy, yy]])
 
 
-def by_multiblobs(places, count=80):
+def by_boundary_elements(places, count=80):
     """(the same of disc prisms, and the radius of the sphere with the drag of one of them)."""
-    spacing = np.sqrt((0.5 * 4.0 / 3.0 * 2.0 * np.pi + np.pi) / count)
-    one = rigid_bodies.surface([DISC], 4.0 / 3.0, spacing)
+    size = np.sqrt((0.5 * 4.0 / 3.0 * 2.0 * np.pi + np.pi) / count)
     middle = np.mean(places, axis=0)
-    whole = np.concatenate([one + [*(np.array(place) - middle), 0.0] for place in places])
     several, alone = (
-        np.linalg.inv(rigid_bodies.rigid_loads(each, rigid_bodies.SPHERE_RADIUS * spacing)[:, :3])[
-            :2, :2
-        ]
+        np.linalg.inv(
+            loads_of([panels_of([DISC + place - middle], 4.0 / 3.0, size) for place in each])
+        )[:2, :2]
         / ALONE
-        for each in (whole, one)
+        for each in (np.array(places), [middle])
     )
     return several, 2.0 / np.trace(alone)
 
@@ -73,8 +73,8 @@ def test_two_apart_are_nearly_exact(gap, ratio):
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_doublets_and_triplets_move_as_multiblobs_do(shape):
-    exact, radius = by_multiblobs(SHAPES[shape])
+def test_doublets_and_triplets_move_as_boundary_elements_do(shape):
+    exact, radius = by_boundary_elements(SHAPES[shape])
     found = mobility(SHAPES[shape], [radius] * len(SHAPES[shape]))
     assert np.linalg.eigvalsh(found) == pytest.approx(np.linalg.eigvalsh(exact), rel=0.02)
 

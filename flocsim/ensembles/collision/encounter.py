@@ -135,7 +135,7 @@ class Encounter(abc.ABC):
     @functools.cached_property
     def scene(self) -> Scene:
         """The two bodies as arrays for the driver, their laws compiled."""
-        scene = self.system.scene(laws=self.laws)
+        scene = self.system.scene(laws=self.laws, near=True)
         keep(scene, self)
         return scene
 

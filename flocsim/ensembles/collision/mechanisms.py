@@ -43,6 +43,7 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import SpherePair, bend, bend_in_flow
 from flocsim.hydrodynamics.pair import interpolation_weights, node_radii
 from flocsim.hydrodynamics.two_spheres import FADES_FROM
+from flocsim.integrators.loop.kicks import overshoot
 from flocsim.system import System
 
 SAME_SPEED = 5e-4
@@ -363,7 +364,9 @@ class Brownian(Weightless):
     @functools.cached_property
     def given(self) -> np.ndarray:
         observed = super().given
-        observed[outcomes.BROWNIAN], observed[outcomes.ESCAPE] = 1.0, self.ends[1]
+        near, far = self.ends
+        seen = min(overshoot(self.scene.kicks, far - self.size), 0.5 * (far - near))
+        observed[outcomes.BROWNIAN], observed[outcomes.ESCAPE] = 1.0, far - seen
         return observed
 
     def longest(self, share: float) -> float:

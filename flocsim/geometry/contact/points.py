@@ -280,19 +280,22 @@ def tangential_component(work, row, vectors, state, at):
 
 
 def overlap_fault(
-    a: Sequence[Part], b: Sequence[Part], along_outlines: float = math.inf
-) -> str | None:
+    a: Sequence[Part], b: Sequence[Part], along_outlines: float = math.inf,
+    deepest: float = DEEPEST_OVERLAP,
+) -> str | None:  # fmt: skip
     """Describe why two placed bodies may not start like this; return None if they may.
 
-    ``along_outlines``: largest overlap [m] for which forces along outlines are defined.
+    ``along_outlines``: largest overlap [m] for which forces along outlines are defined;
+    ``deepest``: largest overlap over r_i + r_j.
     """
     gaps = [(core_gap(one, other), one.radius + other.radius) for one, other in product(a, b)]
     if min(gaps)[0] == 0.0:
         return "with one core inside or across the other"
     for gap, contact in gaps:
         overlap = contact - gap
-        if overlap > DEEPEST_OVERLAP * contact:
-            return f"overlapping by {overlap:.3g} m, more than half of r_i + r_j"
+        if overlap > deepest * contact:
+            share = "half" if deepest == DEEPEST_OVERLAP else f"{100.0 * deepest:g} %"
+            return f"overlapping by {overlap:.3g} m, more than {share} of r_i + r_j"
         if overlap > along_outlines:
             return (
                 f"overlapping by {overlap:.3g} m, more than d_min = {along_outlines:.3g} m of the "

@@ -3,7 +3,9 @@
 The only file that imports shapely.
 """
 
+import functools
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import attrs
@@ -14,6 +16,9 @@ from flocsim.geometry.shapes.cores import Part
 
 MEASURED_QUADRANT = 64
 """Chords per quarter circle in measured outlines."""
+
+LEAST_CELL = 1e-6
+"""Share of the area of a cell below which a piece of it is left out."""
 
 
 def simplicity_fault(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> str | None:
@@ -75,11 +80,32 @@ def swept_rings(parts: Sequence[Part], points_per_quadrant: int = 16) -> list[np
 
     Outer rings first, the largest before others, then holes.
     """
-    whole = swept_geometry(parts, points_per_quadrant)
+    return rings_of(swept_geometry(parts, points_per_quadrant))
+
+
+def rings_of(whole: Any) -> list[np.ndarray]:
+    """Return the closed rings of a shapely geometry: outer ones, the largest first, then holes."""
     pieces = sorted(getattr(whole, "geoms", [whole]), key=lambda piece: -piece.area)
     rings = [piece.exterior for piece in pieces]
     rings += [hole for piece in pieces for hole in piece.interiors]
     return [np.asarray(ring.coords) for ring in rings]
+
+
+def oriented(rings: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return outlines counter-clockwise and holes clockwise, without repeated end points.
+
+    A ring inside an odd number of others is a hole.
+    """
+    import shapely
+
+    return [ring[:-1] for ring in rings_of(shapely.orient_polygons(even_odd(rings)))]
+
+
+def even_odd(rings: Sequence[np.ndarray]) -> Any:
+    """Return the area inside an odd number of rings as a shapely geometry."""
+    import shapely
+
+    return functools.reduce(shapely.symmetric_difference, map(shapely.Polygon, rings))
 
 
 def swept_geometry(parts: Sequence[Part], points_per_quadrant: int) -> Any:
@@ -91,6 +117,32 @@ def swept_geometry(parts: Sequence[Part], points_per_quadrant: int) -> Any:
         for part in parts
     ]
     return swept[0] if len(swept) == 1 else shapely.union_all(swept)
+
+
+def cells_of(
+    rings: Sequence[np.ndarray], size: float, finer: int = 1
+) -> list[tuple[np.ndarray, float, list[np.ndarray]]]:
+    """Return the pieces of an area into which a grid cuts it: a point inside, area and outline.
+
+    ``rings``: outlines and holes (k, 2). Cells of about ``size`` are divided by ``finer`` in both
+    directions. The point is the centroid where that is inside. Outlines are counter-clockwise,
+    their holes clockwise.
+    """
+    import shapely
+
+    whole = even_odd(rings)
+    columns, rows = (
+        np.linspace(low, high, max(1, round((high - low) / size)) * finer + 1)
+        for low, high in np.reshape(whole.bounds, (2, 2)).T
+    )
+    cells = [shapely.box(a, c, b, d) for a, b in pairwise(columns) for c, d in pairwise(rows)]
+    cut = shapely.get_parts(shapely.intersection(whole, cells))
+    pieces = []
+    for piece in shapely.orient_polygons(cut[shapely.area(cut) > LEAST_CELL * cells[0].area]):
+        middle = piece.centroid if piece.contains(piece.centroid) else piece.point_on_surface()
+        edges = [ring[:-1] for ring in rings_of(piece)]
+        pieces.append((np.asarray(middle.coords)[0], piece.area, edges))
+    return pieces
 
 
 def core_geometry(rings: Sequence[np.ndarray]) -> Any:

@@ -34,6 +34,19 @@ SHARE_OF_GAP = 0.25
 them."""
 
 
+OVERSHOOT = 0.5826
+"""−ζ(½)/√(2π): by so much of √(2 D τ) a path in kicks of τ sees a line that ends it further away,
+as it may have crossed it within a kick (Broadie, Glasserman and Kou 1997, Math. Finance 7, 325)."""
+
+
+def overshoot(kicks, gap):
+    """Return how much further away [m] bodies are when they are first seen beyond a distance,
+    ``gap`` being the gap between them there; ``kicks``: those of a Scene."""
+    kick, halvings, spread, least = kicks
+    near = max(SHARE_OF_GAP * gap, least) if halvings > 0.0 else math.inf
+    return OVERSHOOT * min(math.sqrt(spread * kick), near)
+
+
 def has_kicks(scene):
     """Return True if the scene has random forces."""
     return scene.kicks[KICK] > 0.0

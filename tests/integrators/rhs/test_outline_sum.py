@@ -83,12 +83,14 @@ def slopes(energy, pose, step, size):
 
 
 @pytest.mark.parametrize("seed", rest_slow(range(12), lambda seed: seed < 4))
-@pytest.mark.parametrize(("gap", "allowed"), [(2e-9, 5e-5), (3e-8, 3e-3)])
-def test_force_and_torque_are_the_slopes_of_the_energy(seed, gap, allowed):
+@pytest.mark.parametrize(
+    ("gap", "d_min", "allowed"), [(2e-9, 1e-9, 5e-5), (3e-8, 1e-9, 3e-3), (6e-8, 3e-10, 5e-3)]
+)
+def test_force_and_torque_are_the_slopes_of_the_energy(seed, gap, d_min, allowed):
     random = np.random.default_rng(seed)
     one, other = rough(8, SIZE, seed), rough(8 + seed, 1.7 * SIZE, 50 + seed)
     pose = at_gap(one, other, gap, *random.uniform(0.0, 6.28, 2))
-    force = VanDerWaals(HAMAKER, law="outline", depth=1.0)
+    force = VanDerWaals(HAMAKER, d_min, law="outline", depth=1.0)
     found = Pair(other, one, pose, force).loads(*pose)
     pieces = outline_pieces(one.parts), outline_pieces(other.parts)
     wanted = slopes(lambda each: attraction_energy(*pieces, each, HAMAKER), pose, 2e-3 * gap, SIZE)
