@@ -45,8 +45,6 @@ def picture_line(name: str, found: Segmentation) -> str:
         low, high = (f"{value:.2f}" for value in (min(sure), max(sure)))
         how = low if low == high else f"{low} to {high}"
         parts.append(f"{len(sure)} separated at necks, confidence {how} (--neck 0 joins them)")
-    if found.annotated:
-        parts.append("a scale bar or its label left out")
     about = f"foreground {100 * found.foreground_share:.2f} %"
     if found.threshold == found.threshold:
         about += f", threshold {found.threshold:.4g}"

@@ -18,12 +18,12 @@ import attrs
 import numpy as np
 
 from flocsim.errors import ImageError, plural
+from flocsim.io.images.annotations import without_annotations
 from flocsim.io.images.background import (
     low_pass,
     robust_deviation,
     sampled,
     smooth_surface,
-    without_annotations,
 )
 from flocsim.io.images.focus import Focus
 from flocsim.io.images.outlines import (
@@ -34,7 +34,7 @@ from flocsim.io.images.outlines import (
     outlines_at,
     quietened,
 )
-from flocsim.io.images.regions import Filters, Region, find_regions
+from flocsim.io.images.regions import ANNOTATION, Filters, Region, find_regions
 
 UNLIT = 0.04
 """Where the light is below this share of its maximum, a camera's black level drowns the flocs."""
@@ -67,8 +67,7 @@ class Segmentation:
     against the background, that separates the two (0 = background, 1 = full range), the median of
     those of all flocs where each has its own; left_whole:
     regions with necks that were taken for fractal aggregates, and not parted; holes: (h, w) bool,
-    what was filled in the foreground, None where nobody asks any more; annotated: whether a scale
-    bar or its writing was left out.
+    what was filled in the foreground, None where nobody asks any more.
     """
 
     foreground: np.ndarray
@@ -78,7 +77,10 @@ class Segmentation:
     threshold: float
     left_whole: int = 0
     holes: np.ndarray | None = None
-    annotated: bool = False
+
+    @property
+    def annotated(self) -> bool:
+        return any(each.reason == ANNOTATION for each in self.rejected)
 
     @property
     def foreground_share(self) -> float:
@@ -90,10 +92,11 @@ class Segmentation:
         from scipy.ndimage import binary_dilation, label
 
         found = []
-        kept, left = (sum(each.area for each in some) for some in (self.regions, self.rejected))
+        rejected = [each for each in self.rejected if each.reason != ANNOTATION]
+        kept, left = (sum(each.area for each in some) for some in (self.regions, rejected))
         if left > kept:
             found.append(f"{100 * left / (kept + left):.0f} % of the area was rejected")
-        pieces = len(self.regions) + len(self.rejected)
+        pieces = len(self.regions) + len(rejected)
         if pieces >= MANY_PIECES:
             # Gaps of up to 2 APART pixels are none.
             bodies = int(label(binary_dilation(self.foreground, iterations=APART))[1])
@@ -170,13 +173,13 @@ def segment(
     seen = np.zeros(grey.shape, bool)
     for each in outlines:
         seen[each.box] |= each.mask
-    regions, rejected, whole = find_regions(outlines, contrast, filters)
+    regions, rejected, whole = find_regions(outlines, contrast, filters, burnt_in)
     foreground = filled(seen)
     if threshold is None:
-        levels = [each.level for each in regions or rejected]
+        levels = [each.level for each in regions or rejected if each.reason != ANNOTATION]
         threshold = float(np.median(levels)) if levels else float("nan")
-    holes, annotated = foreground & ~seen, bool(burnt_in.any())
-    return Segmentation(foreground, regions, rejected, flocs, threshold, whole, holes, annotated)
+    holes = foreground & ~seen
+    return Segmentation(foreground, regions, rejected, flocs, threshold, whole, holes)
 
 
 def guess_polarity(smooth: np.ndarray, light: np.ndarray | None = None) -> str:

@@ -11,6 +11,7 @@ from flocsim.io.images.outlines import (
     EIGHT,
     PIXEL,
     SHARP,
+    Outline,
     distances,
     filled,
     pieces,
@@ -25,6 +26,9 @@ MANY_PARTS = 4
 
 STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 """From a pixel to half of its eight neighbours: every pair of neighbours once."""
+
+ANNOTATION = "scale bar or lettering"
+"""Why what a program has burnt in is left out."""
 
 NAN = float("nan")
 
@@ -87,10 +91,10 @@ class Filters:
     clear_of_border: bool = True
 
 
-def find_regions(outlines, contrast, filters):
+def find_regions(outlines, contrast, filters, burnt_in):
     """(flocs, regions left out, number of regions with necks that were left whole) of Outlines.
 
-    contrast: (h, w), of which they are.
+    contrast: (h, w), of which they are; burnt_in: (h, w) bool, what was taken out of the picture.
     """
     whole = 0
     closed = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines]
@@ -104,7 +108,16 @@ def find_regions(outlines, contrast, filters):
         top, left, bottom, right = each.bbox
         taken[top:bottom, left:right] |= each.mask[1:-1, 1:-1]
     regions, rejected = (tuple(with_band(each, taken, contrast) for each in some) for some in found)
-    return regions, rejected, whole
+    return regions, rejected + annotations(burnt_in, len(regions) + len(rejected) + 1), whole
+
+
+def annotations(burnt_in, first):
+    """Return the Regions, left out, of what was burnt into a picture; first: the first label."""
+    everywhere = slice(0, burnt_in.shape[0]), slice(0, burnt_in.shape[1])
+    marks = [Outline(box, mask, *[NAN] * 4) for mask, box in pieces(filled(burnt_in), everywhere)]
+    numbers = range(first, first + len(marks))
+    found = sorted_out(marks, burnt_in.shape, Filters(), numbers)
+    return tuple(attrs.evolve(each, reason=ANNOTATION) for some in found for each in some)
 
 
 def sorted_out(outlines, shape, filters, numbers=None):
