@@ -50,8 +50,9 @@ disagree: twice what a lens of a tenth of r_eq makes of it."""
 DEGREE = 6
 """Of the polynomial surface that is the light."""
 
-COARSE = 4
-"""Every fourth pixel tells whether flocs are dark or bright."""
+COARSE, FEWEST_MEANS = (1, 4, 8, 16, 32), 50
+"""Sides of squares [px] whose means tell whether flocs are dark or bright, and how many of them at
+least lie along the shorter side of the picture."""
 
 
 MOST_LABEL = 65535
@@ -183,13 +184,31 @@ def segment(
 
 
 def guess_polarity(smooth: np.ndarray, light: np.ndarray | None = None) -> str:
-    """Return "dark" or "bright", the side of the contrast's longer tail."""
-    coarse = smooth[::COARSE, ::COARSE] if min(smooth.shape) > 50 * COARSE else smooth
-    step = COARSE if coarse is not smooth else 1
-    surface = smooth_surface(coarse, degree=2) if light is None else light[::step, ::step]
-    # From the light, not from their median: flocs may cover most of the picture.
-    beside = coarse - surface
-    return "dark" if np.mean(beside * beside * beside) < 0 else "bright"
+    """Return "dark" or "bright", the side of the contrast's longer tail.
+
+    It is told at the scale at which the tail is the longest, that of the flocs: the grain of a
+    faint picture has a tail of its own, which means over more pixels take away.
+    """
+    tails = []
+    for step in COARSE:
+        if tails and min(smooth.shape) <= FEWEST_MEANS * step:
+            break
+        if step == 1 and min(smooth.shape) > FEWEST_MEANS * COARSE[1]:
+            continue
+        coarse = means(smooth, step)
+        surface = smooth_surface(coarse, degree=2) if light is None else means(light, step)
+        # From the light, not from their median: flocs may cover most of the picture.
+        beside = coarse - surface
+        spread = float(np.mean(beside * beside))
+        tails.append(float(np.mean(beside**3)) / max(spread, 1e-12) ** 1.5)
+    return "dark" if max(tails, key=abs) < 0.0 else "bright"
+
+
+def means(picture: np.ndarray, step: int) -> np.ndarray:
+    """Return the means of a picture over squares of so many pixels."""
+    height, width = (size // step for size in picture.shape)
+    squares = picture[: height * step, : width * step].reshape(height, step, width, step)
+    return squares.mean(axis=(1, 3))
 
 
 def _contrast(grey, smooth, light, flocs, noise_scale):
