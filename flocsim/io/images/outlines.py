@@ -90,7 +90,8 @@ FAINT = 0.25
 class Outline:
     """A region as it is cut: box in the picture, mask (bool array of the box, holes as they are),
     level [contrast], base: the contrast around it, softness [px], contrast: the mean inside less
-    the base, parted: that of Region."""
+    the base, parted: that of Region, faint: whether it is too faint to be of what the picture
+    shows."""
 
     box: Box
     mask: np.ndarray
@@ -99,6 +100,7 @@ class Outline:
     softness: float
     contrast: float
     parted: float = float("nan")
+    faint: bool = False
 
 
 def pieces(mask: np.ndarray, box: Box) -> Iterator[tuple[np.ndarray, Box]]:
@@ -185,8 +187,9 @@ class Search:
         self.area, self.max_blur, self.saturated = np.pi * min_radius**2, max_blur, saturated
 
     def outlines(self) -> list[Outline]:
-        """All regions, in focus or not, of no less than FAINT of the typical contrast: its median,
-        weighted by what each takes from the light, over those that are in focus, or all."""
+        """All regions, in focus or not. Faint are those of less than FAINT of the typical contrast:
+        its median, weighted by what each takes from the light, over those that are in focus, or
+        all; and large ones that hardly rise above the noise."""
         from scipy.ndimage import find_objects, label
 
         above = self.contrast > self.floor
@@ -196,16 +199,29 @@ class Search:
         np.maximum.at(highest, numbers, self.contrast[above])
         large = np.bincount(numbers, minlength=count + 1) >= max(SMALLEST * self.area, 1.0)
         found: list[Outline] = []
-        for number in np.flatnonzero(large & (highest >= 2.0 * self.floor)).tolist():
+        faint: list[Outline] = []
+        for number in np.flatnonzero(large).tolist():
             box = boxes[number - 1]
-            found += self.island(labels[box] == number, box)
+            mask = labels[box] == number
+            if highest[number] >= 2.0 * self.floor:
+                found += self.island(mask, box)
+            else:
+                mean = float(self.contrast[box][mask].mean())
+                faint.append(Outline(box, mask, self.floor, 0.0, float("nan"), mean, faint=True))
+        faint = [each for each in faint if each.mask.sum() >= self.area]
         told = [each for each in found if self.in_focus(each)] or found
         if not told:
-            return []
+            return faint
         order = sorted(told, key=lambda each: each.contrast)
         sums = np.cumsum([each.contrast * each.mask.sum() for each in order])
         typical = order[int(np.searchsorted(sums, 0.5 * sums[-1]))].contrast
-        return [each for each in found if each.contrast >= FAINT * typical]
+        regions = faint
+        for each in found:
+            if each.contrast >= FAINT * typical:
+                regions.append(each)
+            elif each.mask.sum() >= self.area:
+                regions.append(attrs.evolve(each, faint=True))
+        return regions
 
     def in_focus(self, outline: Outline, sharp: float = SHARP) -> bool:
         """Whether an outline is no softer than its size, or `sharp` [px], allows."""

@@ -34,7 +34,7 @@ from flocsim.io.images.outlines import (
     outlines_at,
     quietened,
 )
-from flocsim.io.images.regions import ANNOTATION, Filters, Region, find_regions
+from flocsim.io.images.regions import ANNOTATION, TOO_FAINT, Filters, Region, find_regions
 
 UNLIT = 0.04
 """Where the light is below this share of its maximum, a camera's black level drowns the flocs."""
@@ -93,7 +93,7 @@ class Segmentation:
         from scipy.ndimage import binary_dilation, label
 
         found = []
-        rejected = [each for each in self.rejected if each.reason != ANNOTATION]
+        rejected = [e for e in self.rejected if e.reason not in (TOO_FAINT, ANNOTATION)]
         kept, left = (sum(each.area for each in some) for some in (self.regions, rejected))
         if left > kept:
             found.append(f"{100 * left / (kept + left):.0f} % of the area was rejected")
@@ -173,11 +173,12 @@ def segment(
         outlines = outlines_at(contrast, threshold, Focus(contrast, slope, noise_scale))
     seen = np.zeros(grey.shape, bool)
     for each in outlines:
-        seen[each.box] |= each.mask
+        if not each.faint:
+            seen[each.box] |= each.mask
     regions, rejected, whole = find_regions(outlines, contrast, filters, burnt_in)
     foreground = filled(seen)
     if threshold is None:
-        levels = [each.level for each in regions or rejected if each.reason != ANNOTATION]
+        levels = [each.level for each in regions or rejected if each.level == each.level]
         threshold = float(np.median(levels)) if levels else float("nan")
     holes = foreground & ~seen
     return Segmentation(foreground, regions, rejected, flocs, threshold, whole, holes)

@@ -27,8 +27,8 @@ MANY_PARTS = 4
 STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 """From a pixel to half of its eight neighbours: every pair of neighbours once."""
 
-ANNOTATION = "scale bar or lettering"
-"""Why what a program has burnt in is left out."""
+TOO_FAINT, ANNOTATION = "too faint", "scale bar or lettering"
+"""Why a region is left out that is no floc, be it of what size it may."""
 
 NAN = float("nan")
 
@@ -97,7 +97,7 @@ def find_regions(outlines, contrast, filters, burnt_in):
     contrast: (h, w), of which they are; burnt_in: (h, w) bool, what was taken out of the picture.
     """
     whole = 0
-    closed = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines]
+    closed = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines if not each.faint]
     if filters.neck != 0:
         closed, whole = split_touching(closed, filters.neck, filters.min_radius)
     closed.sort(key=lambda each: (each.box[0].start, each.box[1].start))
@@ -108,16 +108,15 @@ def find_regions(outlines, contrast, filters, burnt_in):
         top, left, bottom, right = each.bbox
         taken[top:bottom, left:right] |= each.mask[1:-1, 1:-1]
     regions, rejected = (tuple(with_band(each, taken, contrast) for each in some) for some in found)
-    return regions, rejected + annotations(burnt_in, len(regions) + len(rejected) + 1), whole
-
-
-def annotations(burnt_in, first):
-    """Return the Regions, left out, of what was burnt into a picture; first: the first label."""
+    faint = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines if each.faint]
     everywhere = slice(0, burnt_in.shape[0]), slice(0, burnt_in.shape[1])
     marks = [Outline(box, mask, *[NAN] * 4) for mask, box in pieces(filled(burnt_in), everywhere)]
-    numbers = range(first, first + len(marks))
-    found = sorted_out(marks, burnt_in.shape, Filters(), numbers)
-    return tuple(attrs.evolve(each, reason=ANNOTATION) for some in found for each in some)
+    for reason, some in ((TOO_FAINT, faint), (ANNOTATION, marks)):
+        first = len(regions) + len(rejected) + 1
+        numbers = range(first, first + len(some))
+        both = sorted_out(some, contrast.shape, filters, numbers)
+        rejected += tuple(attrs.evolve(each, reason=reason) for each in (*both[0], *both[1]))
+    return regions, rejected, whole
 
 
 def sorted_out(outlines, shape, filters, numbers=None):
