@@ -104,8 +104,8 @@ def summary_text(pictures: Sequence[Any]) -> str:
     table.writerow([*COLUMNS, *(f"re_percent_r{r:g}_N{n}" for r, n in pairs)])
     for picture in pictures:
         for region in (*picture.found.regions, *picture.found.rejected):
-            fits = None if region.reason else picture.fits.get(region.label)
-            measures = None if region.reason else picture.measures[region.label]
+            fits = picture.fits.get(region.label)
+            measures = picture.measures.get(region.label)
             radius = region.equivalent_radius
             band = region.radius_band if region.band else (NAN, NAN)
             table.writerow([

@@ -22,7 +22,7 @@ SHARP = 3.5
 """An edge this soft [px] leaves even sizes of 4 px right within 2 % in the mean: none is left out
 for it, or small ones would be missing where large ones are kept."""
 
-TOO_SHARP = 0.75
+SHARPEST = 0.75
 """Share of the blur that all of a picture has: nothing but noise is sharper."""
 
 CORE = 2.0
@@ -82,6 +82,9 @@ PIXEL = 0.25
 SMALLEST = 0.25
 """Share of the least area below which a piece is no region, not even one that is left out."""
 
+TOO_FAINT, TOO_SHARP = "too faint", "too sharp"
+"""Why a region is not of what the picture shows."""
+
 FAINT = 0.25
 """Share of the typical contrast below which a region is not of what the picture shows."""
 
@@ -90,8 +93,8 @@ FAINT = 0.25
 class Outline:
     """A region as it is cut: box in the picture, mask (bool array of the box, holes as they are),
     level [contrast], base: the contrast around it, softness [px], contrast: the mean inside less
-    the base, parted: that of Region, faint: whether it is too faint to be of what the picture
-    shows."""
+    the base, parted: that of Region, reason: TOO_FAINT or TOO_SHARP where it is not of what
+    the picture shows, "" elsewhere."""
 
     box: Box
     mask: np.ndarray
@@ -100,7 +103,7 @@ class Outline:
     softness: float
     contrast: float
     parted: float = float("nan")
-    faint: bool = False
+    reason: str = ""
 
 
 def pieces(mask: np.ndarray, box: Box) -> Iterator[tuple[np.ndarray, Box]]:
@@ -199,7 +202,6 @@ class Search:
         np.maximum.at(highest, numbers, self.contrast[above])
         large = np.bincount(numbers, minlength=count + 1) >= max(SMALLEST * self.area, 1.0)
         found: list[Outline] = []
-        faint: list[Outline] = []
         for number in np.flatnonzero(large).tolist():
             box = boxes[number - 1]
             mask = labels[box] == number
@@ -207,21 +209,20 @@ class Search:
                 found += self.island(mask, box)
             else:
                 mean = float(self.contrast[box][mask].mean())
-                faint.append(Outline(box, mask, self.floor, 0.0, float("nan"), mean, faint=True))
-        faint = [each for each in faint if each.mask.sum() >= self.area]
-        told = [each for each in found if self.in_focus(each)] or found
-        if not told:
-            return faint
+                found.append(
+                    Outline(box, mask, self.floor, 0.0, float("nan"), mean, reason=TOO_FAINT)
+                )
+        plain = [each for each in found if not each.reason]
+        told = [each for each in plain if self.in_focus(each)] or plain
         order = sorted(told, key=lambda each: each.contrast)
         sums = np.cumsum([each.contrast * each.mask.sum() for each in order])
-        typical = order[int(np.searchsorted(sums, 0.5 * sums[-1]))].contrast
-        regions = faint
-        for each in found:
-            if each.contrast >= FAINT * typical:
-                regions.append(each)
-            elif each.mask.sum() >= self.area:
-                regions.append(attrs.evolve(each, faint=True))
-        return regions
+        middle = int(np.searchsorted(sums, 0.5 * sums[-1])) if order else 0
+        least = FAINT * order[middle].contrast if order else 0.0
+        found = [
+            attrs.evolve(each, reason=each.reason or TOO_FAINT * (each.contrast < least))
+            for each in found
+        ]
+        return [each for each in found if not each.reason or each.mask.sum() >= self.area]
 
     def in_focus(self, outline: Outline, sharp: float = SHARP) -> bool:
         """Whether an outline is no softer than its size, or `sharp` [px], allows."""
@@ -282,11 +283,10 @@ class Search:
         for part, place, level in parts:
             whole, wide = widened(filled(part), place, 1, focus.contrast.shape)
             softness = focus.softness(whole, wide)
-            if softness < TOO_SHARP * self.scale:
-                continue
             mean = float(focus.contrast[place][part].mean()) - base
+            reason = TOO_SHARP if softness < SHARPEST * self.scale else ""
             softness = before_filter(softness, self.scale)
-            outline = Outline(place, part, level, base, softness, mean)
+            outline = Outline(place, part, level, base, softness, mean, reason=reason)
             inside = [] if self.in_focus(outline) else self.inside(focus, outline)
             found += inside or [outline]
         return found
@@ -327,7 +327,7 @@ class Search:
         for part, place in pieces(outline.mask & (near > level), outline.box):
             if part.sum() >= self.area:
                 found += [each for each in self.walk(focus, part, place, level)
-                          if self.in_focus(each, CORE)]  # fmt: skip
+                          if not each.reason and self.in_focus(each, CORE)]  # fmt: skip
         return found
 
     def level(self, focus, mask, box, base):

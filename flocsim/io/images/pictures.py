@@ -28,13 +28,15 @@ from flocsim.io.images.background import (
 from flocsim.io.images.focus import Focus
 from flocsim.io.images.outlines import (
     SHARP,
+    TOO_FAINT,
+    TOO_SHARP,
     Search,
     background_noise,
     filled,
     outlines_at,
     quietened,
 )
-from flocsim.io.images.regions import ANNOTATION, TOO_FAINT, Filters, Region, find_regions
+from flocsim.io.images.regions import ANNOTATION, Filters, Region, find_regions
 
 UNLIT = 0.04
 """Where the light is below this share of its maximum, a camera's black level drowns the flocs."""
@@ -93,7 +95,8 @@ class Segmentation:
         from scipy.ndimage import binary_dilation, label
 
         found = []
-        rejected = [e for e in self.rejected if e.reason not in (TOO_FAINT, ANNOTATION)]
+        no_flocs = (TOO_FAINT, TOO_SHARP, ANNOTATION)
+        rejected = [each for each in self.rejected if each.reason not in no_flocs]
         kept, left = (sum(each.area for each in some) for some in (self.regions, rejected))
         if left > kept:
             found.append(f"{100 * left / (kept + left):.0f} % of the area was rejected")
@@ -173,7 +176,7 @@ def segment(
         outlines = outlines_at(contrast, threshold, Focus(contrast, slope, noise_scale))
     seen = np.zeros(grey.shape, bool)
     for each in outlines:
-        if not each.faint:
+        if not each.reason:
             seen[each.box] |= each.mask
     regions, rejected, whole = find_regions(outlines, contrast, filters, burnt_in)
     foreground = filled(seen)
@@ -190,7 +193,7 @@ def guess_polarity(smooth: np.ndarray, light: np.ndarray | None = None) -> str:
     It is told at the scale at which the tail is the longest, that of the flocs: the grain of a
     faint picture has a tail of its own, which means over more pixels take away.
     """
-    tails = []
+    tails: list[float] = []
     for step in COARSE:
         if tails and min(smooth.shape) <= FEWEST_MEANS * step:
             break

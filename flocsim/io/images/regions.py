@@ -27,8 +27,8 @@ MANY_PARTS = 4
 STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 """From a pixel to half of its eight neighbours: every pair of neighbours once."""
 
-TOO_FAINT, ANNOTATION = "too faint", "scale bar or lettering"
-"""Why a region is left out that is no floc, be it of what size it may."""
+ANNOTATION = "scale bar or lettering"
+"""Why what a program has burnt in is left out."""
 
 NAN = float("nan")
 
@@ -97,7 +97,7 @@ def find_regions(outlines, contrast, filters, burnt_in):
     contrast: (h, w), of which they are; burnt_in: (h, w) bool, what was taken out of the picture.
     """
     whole = 0
-    closed = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines if not each.faint]
+    closed = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines if not each.reason]
     if filters.neck != 0:
         closed, whole = split_touching(closed, filters.neck, filters.min_radius)
     closed.sort(key=lambda each: (each.box[0].start, each.box[1].start))
@@ -108,14 +108,13 @@ def find_regions(outlines, contrast, filters, burnt_in):
         top, left, bottom, right = each.bbox
         taken[top:bottom, left:right] |= each.mask[1:-1, 1:-1]
     regions, rejected = (tuple(with_band(each, taken, contrast) for each in some) for some in found)
-    faint = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines if each.faint]
+    others = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines if each.reason]
     everywhere = slice(0, burnt_in.shape[0]), slice(0, burnt_in.shape[1])
-    marks = [Outline(box, mask, *[NAN] * 4) for mask, box in pieces(filled(burnt_in), everywhere)]
-    for reason, some in ((TOO_FAINT, faint), (ANNOTATION, marks)):
-        first = len(regions) + len(rejected) + 1
-        numbers = range(first, first + len(some))
-        both = sorted_out(some, contrast.shape, filters, numbers)
-        rejected += tuple(attrs.evolve(each, reason=reason) for each in (*both[0], *both[1]))
+    for mask, box in pieces(filled(burnt_in), everywhere):
+        others.append(Outline(box, mask, *[NAN] * 4, reason=ANNOTATION))
+    first = len(regions) + len(rejected) + 1
+    numbers = range(first, first + len(others))
+    rejected += sum(sorted_out(others, contrast.shape, filters, numbers), ())
     return regions, rejected, whole
 
 
@@ -131,7 +130,7 @@ def sorted_out(outlines, shape, filters, numbers=None):
         bbox = box[0].start, box[1].start, box[0].stop, box[1].stop
         measured = label, centroid_of(mask, box), bbox, int(mask.sum()), radius
         cut = placed(mask, box, beyond(box, 1)), each.softness, each.level, each.base, each.parted
-        reason = reason_to_reject(box, shape, radius, each.softness, filters)
+        reason = each.reason or reason_to_reject(box, shape, radius, each.softness, filters)
         found.append(Region(*measured, *cut, reason=reason))
     kept, left = ([each for each in found if bool(each.reason) == out] for out in (False, True))
     if numbers is None:
