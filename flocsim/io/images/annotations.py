@@ -39,7 +39,7 @@ STANDING_OUT, SHARPLY = 0.1, 0.7
 FULL = 0.97
 """Share of its box that a rectangle fills, but for a pixel at each corner."""
 
-LONG, SLENDER = 16, 1.5
+LONG, SLENDER = 16, 2.0
 """Least length [px], and times the width, of a bar."""
 
 BOXED = 0.02
