@@ -3,8 +3,9 @@
     python -m benchmarks.accuracy.drawn_pictures [--quick] [--markdown] [--images DIR]
 
 Layered: aggregates of overlapping discs, each of which takes a share of the light; IoU of the
-foreground, regions for bodies. Blurred: real silhouettes of 4 to 20 px under one blur: kept of
-put, mean r_eq kept over put, r_eq found over known, share of known sizes within the bands.
+foreground, regions for bodies. Blurred: real silhouettes under one blur, made three times smaller,
+so that they begin at half of the least size: by known size, kept of put, r_eq found over known,
+share of known sizes within the bands.
 Crowded: the same flocs before halos, discs so blurred that none is in focus.
 """
 
@@ -21,6 +22,8 @@ SOOT = "soot_tem/201805A_A6_004_half"
 FRAME = (600, 800)
 BLURS = (0.0, 1.0, 1.5, 2.0, 2.5, 3.0)
 NOISES = (0.0, 0.02, 0.04, 0.06, 0.1)
+SMALLER = 3
+SIZES = ((2, 4), (4, 6), (6, 8), (8, 20))
 FALSE = 0.3
 """Share of known flocs in a region below which it is of something else."""
 HALOS = (100, 300, 600)
@@ -75,45 +78,57 @@ def layered_table(seeds):
     return table
 
 
-def blurred_frame(masks, blur, noise, vignette):
-    """(grey, labels) of masks in rows on a frame of 1000 × 1000."""
-    labels, x, y, lowest = np.zeros((1000, 1000), int), 40, 40, 0
+def placed_in_rows(masks, side, gap):
+    """Labels of masks in rows on a square frame."""
+    labels, x, y, lowest = np.zeros((side, side), int), gap, gap, 0
     for number, mask in enumerate(masks, start=1):
         height, width = mask.shape
-        if x + width + 40 > 1000:
-            x, y, lowest = 40, y + lowest + 40, 0
-        if y + height + 40 > 1000:
+        if x + width + gap > side:
+            x, y, lowest = gap, y + lowest + gap, 0
+        if y + height + gap > side:
             break
         labels[y : y + height, x : x + width][mask] = number
-        x, lowest = x + width + 40, max(lowest, height)
+        x, lowest = x + width + gap, max(lowest, height)
+    return labels
+
+
+def blurred_frame(cover, blur, noise, vignette):
+    """The grey of flocs that cover so much of each pixel, 1000 × 1000."""
     down, across = np.mgrid[-1:1:1000j, -1:1:1000j]
     light = 0.8 * (1.0 - 0.5 * vignette * (down**2 + across**2))
-    grey = light * (1.0 - 0.6 * gaussian_filter((labels > 0).astype(float), blur))
+    grey = light * (1.0 - 0.6 * gaussian_filter(cover, blur))
     grey += noise * np.random.default_rng(1).standard_normal(grey.shape)
-    return np.clip(grey, 0.0, 1.0), labels
+    return np.clip(grey, 0.0, 1.0)
 
 
 def blurred_table(masks):
-    """What is kept of flocs of all sizes under one blur, and how large it comes out."""
-    columns = ("blur px", "noise", "vignette", "put", "kept", "mean r_eq kept/put",
+    """What is kept of flocs of each size under one blur, and how large it comes out."""
+    columns = ("blur px", "noise", "vignette", "known r_eq px", "put", "kept",
                "r_eq found/known", "deviation", "within bands %")  # fmt: skip
-    table = Table("Silhouettes of 4 to 20 px under one blur", columns)
+    table = Table("Silhouettes under one blur, by size; the least size is 4 px", columns)
+    fine = placed_in_rows(masks, 1000 * SMALLER, 40 * SMALLER)
+    labels = fine[SMALLER // 2 :: SMALLER, SMALLER // 2 :: SMALLER]
+    put = np.sqrt(np.bincount(fine.ravel())[1:] / np.pi) / SMALLER
+    cover = (fine > 0).reshape(1000, SMALLER, 1000, SMALLER).mean(axis=(1, 3))
     for blur in BLURS:
-        for noise, vignette in ((0.0, 0.0), (0.02, 0.6), (0.05, 0.6)):
-            grey, labels = blurred_frame(masks, blur, noise, vignette)
-            put, kept, _ = compared(segment(grey).regions, labels)
-            known, found, low, high = np.array(kept).T
-            ratio = found / known
-            within = 100 * np.mean((low <= known) & (known <= high))
-            table.add(blur, noise, vignette, len(put), len(known), known.mean() / put.mean(),
-                      ratio.mean(), ratio.std(), within)  # fmt: skip
+        for noise, vignette in ((0.0, 0.0), (0.02, 0.6), (0.05, 0.8)):
+            regions = segment(blurred_frame(cover, blur, noise, vignette)).regions
+            known, found, low, high = np.array(compared(regions, labels, put)[0]).T
+            for least, most in SIZES:
+                here = (least <= known) & (known < most)
+                there = np.count_nonzero((least <= put) & (put < most))
+                ratio = found[here] / known[here]
+                within = np.mean((low <= known)[here] & (known <= high)[here]) if here.any() else 1
+                table.add(blur, noise, vignette, f"{least} to {most}", there, len(ratio),
+                          ratio.mean() if len(ratio) else "", ratio.std() if len(ratio) else "",
+                          100 * within if len(ratio) else "")  # fmt: skip
     return table
 
 
-def compared(regions, labels):
-    """Of regions and known flocs: r_eq of all known, [(known, found, band low, high)] of those
+def compared(regions, labels, put):
+    """Of regions and known flocs, ``put`` their r_eq: [(known, found, band low, high)] of those
     found, and the number of regions that are not mainly of known flocs."""
-    put, kept, false = np.sqrt(np.bincount(labels.ravel())[1:] / np.pi), [], 0
+    kept, false = [], 0
     for region in regions:
         top, left, bottom, right = region.bbox
         under = labels[top:bottom, left:right][region.mask[1:-1, 1:-1]]
@@ -122,13 +137,13 @@ def compared(regions, labels):
             continue
         known = put[np.bincount(under[under > 0]).argmax() - 1]
         kept.append((known, region.equivalent_radius, *region.radius_band))
-    return put, kept, false
+    return kept, false
 
 
 def crowded_frame(masks, halos, noise, seed):
     """(grey, labels) of the masks before so many halos."""
     rng = np.random.default_rng(seed)
-    _, labels = blurred_frame([masks[k] for k in rng.permutation(len(masks))], 0.0, 0.0, 0.0)
+    labels = placed_in_rows([masks[k] for k in rng.permutation(len(masks))], 1000, 40)
     grey = 0.8 * (1.0 - 0.6 * gaussian_filter((labels > 0).astype(float), 1.2))
     for _ in range(halos):
         (y, x), radius = rng.uniform(0, 1000, 2), rng.uniform(8.0, 35.0)
@@ -149,10 +164,12 @@ def crowded_table(masks, seeds):
     for halos in HALOS:
         for noise in (0.0, 0.02):
             frames = [crowded_frame(masks, halos, noise, seed) for seed in seeds]
-            each = [compared(segment(g, flocs="dark").regions, found) for g, found in frames]
-            known, found, low, high = np.array([row for _, kept, _ in each for row in kept]).T
-            ratio, put = found / known, sum(len(all_put) for all_put, _, _ in each)
-            table.add(halos, noise, put, len(known), sum(false for *_, false in each),
+            sizes = [np.sqrt(np.bincount(at.ravel())[1:] / np.pi) for _, at in frames]
+            each = [compared(segment(grey, flocs="dark").regions, at, put)
+                    for (grey, at), put in zip(frames, sizes, strict=True)]  # fmt: skip
+            known, found, low, high = np.array([row for kept, _ in each for row in kept]).T
+            ratio, put = found / known, sum(map(len, sizes))
+            table.add(halos, noise, put, len(known), sum(false for _, false in each),
                       ratio.mean(), ratio.std(), np.sum(np.abs(ratio - 1.0) > 0.1),
                       100 * np.mean((low <= known) & (known <= high)))  # fmt: skip
     return table
@@ -175,7 +192,7 @@ def main():
     soot_table(images).print()
     layered_table(range(2 if arguments.quick else 8)).print()
     masks = [mask for mask, _ in silhouettes(images) if max(mask.shape) < 72][:80]
-    blurred_table(masks).print()
+    blurred_table([mask for mask, _ in silhouettes(images) if max(mask.shape) < 200]).print()
     crowded_table(masks, range(1 if arguments.quick else 3)).print()
 
 

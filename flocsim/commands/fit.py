@@ -55,6 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         spaced on the outline, as a baseline (default: %(default)s)
     --preserve-area: give every shape exactly the area of its floc
     --inscribed: keep every shape inside its floc
+    --max-error PERCENT: leave out flocs whose relative error of area at the largest N is above this
+        (default: 10 for flocs found in pictures, from N = 16 on; otherwise none are left out)
     --holes: keep the largest holes of flocs: the vertices are shared between the outline and the
         holes, and area and centroid are those without the holes
     --band: fit every floc three times, to its outline and to the tightest and the widest outline
@@ -106,6 +108,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--method", default="pattern", choices=("pattern", "paper", "even"))
     for flag in ("--preserve-area", "--inscribed", "--holes", "--band", "--masks"):
         add(flag, action="store_true")
+    add("--max-error", type=positive)
     add("--jobs", type=whole, default=1)
     add("-o", "--output", default="shapes.h5")
     for name in ("--fits", "--masks-out"):

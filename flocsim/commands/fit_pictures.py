@@ -3,6 +3,7 @@ of them over the pictures.
 """
 
 import contextlib
+import math
 import os
 import sys
 import warnings
@@ -16,7 +17,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.errors import FileError, FlocsimError, ImageError, ShapeError, UsageError
+from flocsim.errors import FileError, FlocsimError, ImageError, ShapeError, UsageError, plural
 from flocsim.geometry.fit.fit import Fit, fit_mask
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.files import Rule, write_file
@@ -28,6 +29,7 @@ from flocsim.io.images.pictures import Segmentation, segment, weighed
 from flocsim.io.images.reading import SUFFIXES, check_file, grey_of, read_grey, read_pixels
 from flocsim.io.images.regions import Region, mask_measures, with_holes
 from flocsim.io.images.review import (
+    REJECT,
     Choices,
     checksum_of,
     choices_of,
@@ -48,6 +50,10 @@ Fits = dict[float, dict[int, Fit]]
 
 Task = tuple[Path, str, np.ndarray | None, Namespace, dict[str, Choices] | None]
 """A file of pictures, its title, the background, the options, and the choices made by eye."""
+
+MOST_ERROR, FEW = 10.0, 16
+"""RE [%] above which a region is more likely several flocs, or a halo, than one, and the number of
+vertices from which on this is so."""
 
 MOST_FRAMES = 25
 """More frames than this tell hardly more about the light."""
@@ -134,7 +140,45 @@ def fit_pictures(paths: Sequence[Path], options: Namespace) -> tuple[list[Pictur
         progress.finish()
     for name, reason in lost.items():
         report(f"{name} was not fitted: {reason}; the other pictures were fitted")
-    return [each for each in pictures if each.name not in lost], list(lost)
+    fitted = [each for each in pictures if each.name not in lost]
+    return [without_misfits(each, error_limit(options)) for each in fitted], list(lost)
+
+
+def error_limit(options: Namespace) -> float:
+    """Return the RE [%] above which flocs are left out.
+
+    Unless it is given, flocs that were chosen by eye or came as masks stay, and so do all if the
+    vertices are too few to follow any floc.
+    """
+    if options.max_error is not None:
+        return float(options.max_error)
+    chosen_by_hand = options.masks or options.reviewed is not None
+    return math.inf if chosen_by_hand or max(options.vertices) < FEW else MOST_ERROR
+
+
+def without_misfits(picture: Picture, limit: float) -> Picture:
+    """Return the Picture without the flocs whose fit at the largest N has a larger RE [%]."""
+    bad = {
+        each.label
+        for each in picture.found.regions
+        # A disk that does not enter the floc says nothing about its outline.
+        if min(picture.fits[each.label][0]) < each.equivalent_radius
+        and picture.finest(each).relative_error > limit
+    }
+    if not bad:
+        return picture
+    count = len(picture.finest(picture.found.regions[0]).vertices)
+    report(
+        f"{picture.name}: {plural(len(bad), 'floc')} left out, as RE is above {limit:g} % at "
+        f"N = {count} (--max-error)"
+    )
+    flocs = [
+        each | {"choice": REJECT} if each["floc"] in bad else each
+        for each in picture.choices["flocs"]
+    ]
+    choices = {**picture.choices, "flocs": flocs}
+    found = chosen(picture.found, choices, f"RE above {limit:g} %")
+    return attrs.evolve(picture, found=found, choices=choices)
 
 
 def titles_of(paths: Sequence[Path]) -> list[str]:

@@ -45,8 +45,6 @@ def picture_line(name: str, found: Segmentation) -> str:
         low, high = (f"{value:.2f}" for value in (min(sure), max(sure)))
         how = low if low == high else f"{low} to {high}"
         parts.append(f"{len(sure)} separated at necks, confidence {how} (--neck 0 joins them)")
-    if found.annotated:
-        parts.append("a scale bar or its label left out")
     about = f"foreground {100 * found.foreground_share:.2f} %"
     if found.threshold == found.threshold:
         about += f", threshold {found.threshold:.4g}"
@@ -106,8 +104,8 @@ def summary_text(pictures: Sequence[Any]) -> str:
     table.writerow([*COLUMNS, *(f"re_percent_r{r:g}_N{n}" for r, n in pairs)])
     for picture in pictures:
         for region in (*picture.found.regions, *picture.found.rejected):
-            fits = None if region.reason else picture.fits.get(region.label)
-            measures = None if region.reason else picture.measures[region.label]
+            fits = picture.fits.get(region.label)
+            measures = picture.measures.get(region.label)
             radius = region.equivalent_radius
             band = region.radius_band if region.band else (NAN, NAN)
             table.writerow([

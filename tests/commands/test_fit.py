@@ -59,6 +59,30 @@ def test_pictures_become_a_library(tmp_path, frame, capsys):
     assert f"{mean:.2f} at N = 16" in printed.out
 
 
+@pytest.mark.parametrize(
+    ("options", "kept"),
+    [((), 1), (("--max-error", "60"), 2), (("--max-error", "1e-9"), 0), (("--vertices", "8"), 2)],
+)
+def test_flocs_whose_fit_is_too_far_off_are_left_out(tmp_path, capsys, options, kept):
+    y, x = np.mgrid[:200, :400]
+    grey = np.full(x.shape, 0.8)
+    for cx, arms in ((100, 9), (300, 2)):
+        angle = np.arctan2(y - 100, x - cx)
+        grey[np.hypot(x - cx, y - 100) < 40 * (1 + 0.35 * np.cos(arms * angle))] = 0.1
+    Image.fromarray((255 * grey).astype(np.uint8)).save(tmp_path / "a.png")
+    library = tmp_path / "s.h5"
+    common = ("--pixel-size", "1e-6", "--neck", "0", "--vertices", "16", "-o", library)
+    code = code_of(tmp_path / "a.png", *common, *options)
+    assert (code == 0) == (kept > 0)
+    if kept:
+        assert len(read_library(library)) == kept
+        rows = list(csv.DictReader(library.with_suffix(".csv").read_text().splitlines()))
+        reasons = [row["left_out_because"] for row in rows]
+        assert reasons == [""] * kept + ["RE above 10 %"] * (2 - kept)
+        assert all(float(row["re_percent_r1_N16"]) > 10 for row in rows[1:2] if kept == 1)
+    assert ("--max-error" in capsys.readouterr().err) == (kept < 2)
+
+
 def test_a_pixel_size_with_its_unit(tmp_path, frame):
     options = ("--vertices", "4", "--min-radius", "12", "-o", tmp_path / "s.h5")
     assert run(frame, "--pixel-size", "0.95 um", *options) == 0

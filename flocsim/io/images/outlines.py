@@ -19,10 +19,11 @@ EIGHT = np.ones((3, 3), int)
 """Diagonal pixels belong together."""
 
 SHARP = 3.5
-"""An edge this soft [px] leaves even sizes of 4 px right within 2 % in the mean: none is left out
-for it, or small ones would be missing where large ones are kept."""
+"""An edge this soft [px] leaves sizes from 8 px on right within 2 % in the mean. Smaller ones
+come out up to 6 % too small, but are not left out for it, or they would be missing where large ones
+are kept."""
 
-TOO_SHARP = 0.75
+SHARPEST = 0.75
 """Share of the blur that all of a picture has: nothing but noise is sharper."""
 
 CORE = 2.0
@@ -82,6 +83,9 @@ PIXEL = 0.25
 SMALLEST = 0.25
 """Share of the least area below which a piece is no region, not even one that is left out."""
 
+TOO_FAINT, TOO_SHARP = "too faint", "too sharp"
+"""Why a region is not of what the picture shows."""
+
 FAINT = 0.25
 """Share of the typical contrast below which a region is not of what the picture shows."""
 
@@ -90,7 +94,8 @@ FAINT = 0.25
 class Outline:
     """A region as it is cut: box in the picture, mask (bool array of the box, holes as they are),
     level [contrast], base: the contrast around it, softness [px], contrast: the mean inside less
-    the base, parted: that of Region."""
+    the base, parted: that of Region, reason: TOO_FAINT or TOO_SHARP where it is not of what
+    the picture shows, "" elsewhere."""
 
     box: Box
     mask: np.ndarray
@@ -99,6 +104,7 @@ class Outline:
     softness: float
     contrast: float
     parted: float = float("nan")
+    reason: str = ""
 
 
 def pieces(mask: np.ndarray, box: Box) -> Iterator[tuple[np.ndarray, Box]]:
@@ -185,8 +191,9 @@ class Search:
         self.area, self.max_blur, self.saturated = np.pi * min_radius**2, max_blur, saturated
 
     def outlines(self) -> list[Outline]:
-        """All regions, in focus or not, of no less than FAINT of the typical contrast: its median,
-        weighted by what each takes from the light, over those that are in focus, or all."""
+        """All regions, in focus or not. Faint are those of less than FAINT of the typical contrast:
+        its median, weighted by what each takes from the light, over those that are in focus, or
+        all; and large ones that hardly rise above the noise."""
         from scipy.ndimage import find_objects, label
 
         above = self.contrast > self.floor
@@ -196,16 +203,27 @@ class Search:
         np.maximum.at(highest, numbers, self.contrast[above])
         large = np.bincount(numbers, minlength=count + 1) >= max(SMALLEST * self.area, 1.0)
         found: list[Outline] = []
-        for number in np.flatnonzero(large & (highest >= 2.0 * self.floor)).tolist():
+        for number in np.flatnonzero(large).tolist():
             box = boxes[number - 1]
-            found += self.island(labels[box] == number, box)
-        told = [each for each in found if self.in_focus(each)] or found
-        if not told:
-            return []
+            mask = labels[box] == number
+            if highest[number] >= 2.0 * self.floor:
+                found += self.island(mask, box)
+            else:
+                mean = float(self.contrast[box][mask].mean())
+                found.append(
+                    Outline(box, mask, self.floor, 0.0, float("nan"), mean, reason=TOO_FAINT)
+                )
+        plain = [each for each in found if not each.reason]
+        told = [each for each in plain if self.in_focus(each)] or plain
         order = sorted(told, key=lambda each: each.contrast)
         sums = np.cumsum([each.contrast * each.mask.sum() for each in order])
-        typical = order[int(np.searchsorted(sums, 0.5 * sums[-1]))].contrast
-        return [each for each in found if each.contrast >= FAINT * typical]
+        middle = int(np.searchsorted(sums, 0.5 * sums[-1])) if order else 0
+        least = FAINT * order[middle].contrast if order else 0.0
+        found = [
+            attrs.evolve(each, reason=each.reason or TOO_FAINT * (each.contrast < least))
+            for each in found
+        ]
+        return [each for each in found if not each.reason or each.mask.sum() >= self.area]
 
     def in_focus(self, outline: Outline, sharp: float = SHARP) -> bool:
         """Whether an outline is no softer than its size, or `sharp` [px], allows."""
@@ -266,11 +284,10 @@ class Search:
         for part, place, level in parts:
             whole, wide = widened(filled(part), place, 1, focus.contrast.shape)
             softness = focus.softness(whole, wide)
-            if softness < TOO_SHARP * self.scale:
-                continue
             mean = float(focus.contrast[place][part].mean()) - base
+            reason = TOO_SHARP if softness < SHARPEST * self.scale else ""
             softness = before_filter(softness, self.scale)
-            outline = Outline(place, part, level, base, softness, mean)
+            outline = Outline(place, part, level, base, softness, mean, reason=reason)
             inside = [] if self.in_focus(outline) else self.inside(focus, outline)
             found += inside or [outline]
         return found
@@ -311,7 +328,7 @@ class Search:
         for part, place in pieces(outline.mask & (near > level), outline.box):
             if part.sum() >= self.area:
                 found += [each for each in self.walk(focus, part, place, level)
-                          if self.in_focus(each, CORE)]  # fmt: skip
+                          if not each.reason and self.in_focus(each, CORE)]  # fmt: skip
         return found
 
     def level(self, focus, mask, box, base):

@@ -7,7 +7,7 @@ picture. It has no notion of uneven light. What lies beyond the mask is shared w
 
 import numpy as np
 
-from flocsim.io.images.background import without_annotations
+from flocsim.io.images.annotations import without_annotations
 from flocsim.io.images.focus import Focus
 from flocsim.io.images.outlines import background_noise, filled, outlines_at
 from flocsim.io.images.pictures import Segmentation, guess_polarity
@@ -68,9 +68,8 @@ def segment_as_paper(
     _, slope = background_noise(stretched, 0.0, 0.5 / cutoff)
     outlines = outlines_at(stretched, level, Focus(stretched, slope, 0.0))
     regions, rejected, whole = find_regions(
-        outlines, stretched, Filters(min_radius, max_radius, max_blur, neck)
+        outlines, stretched, Filters(min_radius, max_radius, max_blur, neck), burnt_in
     )
     seen = stretched > level
     foreground = filled(seen)
-    holes, annotated = foreground & ~seen, bool(burnt_in.any())
-    return Segmentation(foreground, regions, rejected, flocs, level, whole, holes, annotated)
+    return Segmentation(foreground, regions, rejected, flocs, level, whole, foreground & ~seen)

@@ -18,23 +18,25 @@ import attrs
 import numpy as np
 
 from flocsim.errors import ImageError, plural
+from flocsim.io.images.annotations import without_annotations
 from flocsim.io.images.background import (
     low_pass,
     robust_deviation,
     sampled,
     smooth_surface,
-    without_annotations,
 )
 from flocsim.io.images.focus import Focus
 from flocsim.io.images.outlines import (
     SHARP,
+    TOO_FAINT,
+    TOO_SHARP,
     Search,
     background_noise,
     filled,
     outlines_at,
     quietened,
 )
-from flocsim.io.images.regions import Filters, Region, find_regions
+from flocsim.io.images.regions import ANNOTATION, Filters, Region, find_regions
 
 UNLIT = 0.04
 """Where the light is below this share of its maximum, a camera's black level drowns the flocs."""
@@ -50,8 +52,9 @@ disagree: twice what a lens of a tenth of r_eq makes of it."""
 DEGREE = 6
 """Of the polynomial surface that is the light."""
 
-COARSE = 4
-"""Every fourth pixel tells whether flocs are dark or bright."""
+COARSE, FEWEST_MEANS = (1, 4, 8, 16, 32), 50
+"""Sides of squares [px] whose means tell whether flocs are dark or bright, and how many of them at
+least lie along the shorter side of the picture."""
 
 
 MOST_LABEL = 65535
@@ -67,8 +70,7 @@ class Segmentation:
     against the background, that separates the two (0 = background, 1 = full range), the median of
     those of all flocs where each has its own; left_whole:
     regions with necks that were taken for fractal aggregates, and not parted; holes: (h, w) bool,
-    what was filled in the foreground, None where nobody asks any more; annotated: whether a scale
-    bar or its writing was left out.
+    what was filled in the foreground, None where nobody asks any more.
     """
 
     foreground: np.ndarray
@@ -78,7 +80,10 @@ class Segmentation:
     threshold: float
     left_whole: int = 0
     holes: np.ndarray | None = None
-    annotated: bool = False
+
+    @property
+    def annotated(self) -> bool:
+        return any(each.reason == ANNOTATION for each in self.rejected)
 
     @property
     def foreground_share(self) -> float:
@@ -90,10 +95,12 @@ class Segmentation:
         from scipy.ndimage import binary_dilation, label
 
         found = []
-        kept, left = (sum(each.area for each in some) for some in (self.regions, self.rejected))
+        no_flocs = (TOO_FAINT, TOO_SHARP, ANNOTATION)
+        rejected = [each for each in self.rejected if each.reason not in no_flocs]
+        kept, left = (sum(each.area for each in some) for some in (self.regions, rejected))
         if left > kept:
             found.append(f"{100 * left / (kept + left):.0f} % of the area was rejected")
-        pieces = len(self.regions) + len(self.rejected)
+        pieces = len(self.regions) + len(rejected)
         if pieces >= MANY_PIECES:
             # Gaps of up to 2 APART pixels are none.
             bodies = int(label(binary_dilation(self.foreground, iterations=APART))[1])
@@ -169,24 +176,43 @@ def segment(
         outlines = outlines_at(contrast, threshold, Focus(contrast, slope, noise_scale))
     seen = np.zeros(grey.shape, bool)
     for each in outlines:
-        seen[each.box] |= each.mask
-    regions, rejected, whole = find_regions(outlines, contrast, filters)
+        if not each.reason:
+            seen[each.box] |= each.mask
+    regions, rejected, whole = find_regions(outlines, contrast, filters, burnt_in)
     foreground = filled(seen)
     if threshold is None:
-        levels = [each.level for each in regions or rejected]
+        levels = [each.level for each in regions or rejected if each.level == each.level]
         threshold = float(np.median(levels)) if levels else float("nan")
-    holes, annotated = foreground & ~seen, bool(burnt_in.any())
-    return Segmentation(foreground, regions, rejected, flocs, threshold, whole, holes, annotated)
+    holes = foreground & ~seen
+    return Segmentation(foreground, regions, rejected, flocs, threshold, whole, holes)
 
 
 def guess_polarity(smooth: np.ndarray, light: np.ndarray | None = None) -> str:
-    """Return "dark" or "bright", the side of the contrast's longer tail."""
-    coarse = smooth[::COARSE, ::COARSE] if min(smooth.shape) > 50 * COARSE else smooth
-    step = COARSE if coarse is not smooth else 1
-    surface = smooth_surface(coarse, degree=2) if light is None else light[::step, ::step]
-    # From the light, not from their median: flocs may cover most of the picture.
-    beside = coarse - surface
-    return "dark" if np.mean(beside * beside * beside) < 0 else "bright"
+    """Return "dark" or "bright", the side of the contrast's longer tail.
+
+    It is told at the scale at which the tail is the longest, that of the flocs: the grain of a
+    faint picture has a tail of its own, which means over more pixels take away.
+    """
+    tails: list[float] = []
+    for step in COARSE:
+        if tails and min(smooth.shape) <= FEWEST_MEANS * step:
+            break
+        if step == 1 and min(smooth.shape) > FEWEST_MEANS * COARSE[1]:
+            continue
+        coarse = means(smooth, step)
+        surface = smooth_surface(coarse, degree=2) if light is None else means(light, step)
+        # From the light, not from their median: flocs may cover most of the picture.
+        beside = coarse - surface
+        spread = float(np.mean(beside * beside))
+        tails.append(float(np.mean(beside**3)) / max(spread, 1e-12) ** 1.5)
+    return "dark" if max(tails, key=abs) < 0.0 else "bright"
+
+
+def means(picture: np.ndarray, step: int) -> np.ndarray:
+    """Return the means of a picture over squares of so many pixels."""
+    height, width = (size // step for size in picture.shape)
+    squares = picture[: height * step, : width * step].reshape(height, step, width, step)
+    return squares.mean(axis=(1, 3))
 
 
 def _contrast(grey, smooth, light, flocs, noise_scale):

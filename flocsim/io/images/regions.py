@@ -11,6 +11,7 @@ from flocsim.io.images.outlines import (
     EIGHT,
     PIXEL,
     SHARP,
+    Outline,
     distances,
     filled,
     pieces,
@@ -25,6 +26,9 @@ MANY_PARTS = 4
 
 STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 """From a pixel to half of its eight neighbours: every pair of neighbours once."""
+
+ANNOTATION = "scale bar or lettering"
+"""Why what a program has burnt in is left out."""
 
 NAN = float("nan")
 
@@ -87,13 +91,13 @@ class Filters:
     clear_of_border: bool = True
 
 
-def find_regions(outlines, contrast, filters):
+def find_regions(outlines, contrast, filters, burnt_in):
     """(flocs, regions left out, number of regions with necks that were left whole) of Outlines.
 
-    contrast: (h, w), of which they are.
+    contrast: (h, w), of which they are; burnt_in: (h, w) bool, what was taken out of the picture.
     """
     whole = 0
-    closed = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines]
+    closed = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines if not each.reason]
     if filters.neck != 0:
         closed, whole = split_touching(closed, filters.neck, filters.min_radius)
     closed.sort(key=lambda each: (each.box[0].start, each.box[1].start))
@@ -104,6 +108,13 @@ def find_regions(outlines, contrast, filters):
         top, left, bottom, right = each.bbox
         taken[top:bottom, left:right] |= each.mask[1:-1, 1:-1]
     regions, rejected = (tuple(with_band(each, taken, contrast) for each in some) for some in found)
+    others = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines if each.reason]
+    everywhere = slice(0, burnt_in.shape[0]), slice(0, burnt_in.shape[1])
+    for mask, box in pieces(filled(burnt_in), everywhere):
+        others.append(Outline(box, mask, *[NAN] * 4, reason=ANNOTATION))
+    first = len(regions) + len(rejected) + 1
+    numbers = range(first, first + len(others))
+    rejected += sum(sorted_out(others, contrast.shape, filters, numbers), ())
     return regions, rejected, whole
 
 
@@ -119,7 +130,7 @@ def sorted_out(outlines, shape, filters, numbers=None):
         bbox = box[0].start, box[1].start, box[0].stop, box[1].stop
         measured = label, centroid_of(mask, box), bbox, int(mask.sum()), radius
         cut = placed(mask, box, beyond(box, 1)), each.softness, each.level, each.base, each.parted
-        reason = reason_to_reject(box, shape, radius, each.softness, filters)
+        reason = each.reason or reason_to_reject(box, shape, radius, each.softness, filters)
         found.append(Region(*measured, *cut, reason=reason))
     kept, left = ([each for each in found if bool(each.reason) == out] for out in (False, True))
     if numbers is None:

@@ -114,7 +114,7 @@ def is_same(found: Choices, once: Choices) -> bool:
     return all(near) and all(found[key] == once[key] for key in ("floc", "left_out_because"))
 
 
-def chosen(found: Segmentation, choices: Choices) -> Segmentation:
+def chosen(found: Segmentation, choices: Choices, why: str = BY_EYE) -> Segmentation:
     """Return the Segmentation with the flocs that were chosen; numbers stay."""
     kept = {each["floc"] for each in choices["flocs"] if each["choice"] == KEEP}
     regions: list[Region] = []
@@ -123,7 +123,7 @@ def chosen(found: Segmentation, choices: Choices) -> Segmentation:
         if each.label in kept:
             regions.append(attrs.evolve(each, reason=""))
         else:
-            rejected.append(attrs.evolve(each, reason=each.reason or BY_EYE))
+            rejected.append(attrs.evolve(each, reason=each.reason or why))
     return attrs.evolve(found, regions=tuple(regions), rejected=tuple(rejected))
 
 

@@ -5,8 +5,9 @@ import io
 import numpy as np
 import pytest
 from PIL import Image, ImageDraw, ImageFont
+from scipy.ndimage import gaussian_filter
 
-from flocsim.io.images.background import without_annotations
+from flocsim.io.images.annotations import without_annotations
 from flocsim.io.images.pictures import segment
 from flocsim.io.images.reading import read_grey
 from tests.helpers.real_images import real_image
@@ -56,6 +57,50 @@ def test_bars_are_no_flocs_and_flocs_stay(number):
     assert len(before.regions) == len(found.regions) == 6
     for one, other in zip(found.regions, before.regions, strict=True):
         assert one.equivalent_radius == pytest.approx(other.equivalent_radius, rel=0.03)
+
+
+def drawn_on(plain, mark, colour):
+    """The picture of uint8 with a mark in a colour."""
+    picture = Image.fromarray((255 * plain).astype("u1"))
+    draw = ImageDraw.Draw(picture)
+    if mark.isalpha():
+        draw.text((150, 230), mark, fill=colour, font=ImageFont.load_default(56))
+        return picture
+    length, width = {"fat": (90, 40), "hairline": (120, 1), "capped": (120, 4)}[mark[1:]]
+    draw.rectangle([150, 280, 149 + length, 279 + width], fill=colour)
+    for x in (150, 150 + length - width) if mark == "-capped" else ():
+        draw.rectangle([x, 272, x + width - 1, 291], fill=colour)
+    draw.text((160, 236), "20 nm", fill=colour, font=ImageFont.load_default(28))
+    return picture
+
+
+@pytest.mark.parametrize("mark", ["-fat", "-hairline", "-capped", "B", "E", "K"])
+@pytest.mark.parametrize("scale", [0.7, 1.0, 1.6])
+@pytest.mark.parametrize("dark", [True, False])
+def test_bars_and_letters_of_any_form_are_no_flocs_in_resized_figures(mark, scale, dark):
+    size = tuple(int(scale * side) for side in SIZE[::-1])
+    plain, marked = (
+        np.asarray(picture.resize(size, Image.Resampling.BICUBIC)) / 255.0
+        for picture in (Image.fromarray((255 * flocs(dark)).astype("u1")),
+                        drawn_on(flocs(dark), mark, 0 if dark else 255))
+    )  # fmt: skip
+    found, before = segment(marked), segment(plain)
+    assert len(found.regions) == len(before.regions)
+    left_out = [each for each in found.rejected if each.reason == "scale bar or lettering"]
+    assert left_out and all(each.centroid[1] > 200 * scale for each in left_out)
+
+
+@pytest.mark.parametrize("bright", [True, False])
+@pytest.mark.parametrize("blur", [0.0, 1.0, 2.0])
+def test_aggregates_and_rods_of_one_tone_are_flocs(bright, blur):
+    y, x = np.mgrid[:300, :400]
+    inside = np.zeros(x.shape, bool)
+    for k in range(8):  # a row of beads that touch, and one along a diagonal
+        inside |= np.hypot(x - 60 - 15 * k, y - 60) < 8
+        inside |= np.hypot(x - 250 - 11 * k, y - 150 - 10 * k) < 8
+    inside |= np.hypot((x - 80) / 5, y - 200) < 7
+    covered = gaussian_filter(inside.astype(float), blur)
+    assert not without_annotations(0.1 + 0.9 * covered if bright else 0.9 - 0.9 * covered)[1].any()
 
 
 @pytest.mark.parametrize("dark", [True, False])
