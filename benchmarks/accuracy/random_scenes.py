@@ -1,11 +1,14 @@
 """Numbered random scenes that reach every part of the engine, and how each of them ends.
 
     python -m benchmarks.accuracy.random_scenes [--quick] [--scenes 2000] [--first 0] [--family …]
+                                                [--errors]
 
 Scene k depends on k alone, so that a number names it for good. The families take turns: any
 seventeen numbers in a row have all of them. Scenes are short, a few hundred steps of some bodies of
 5 µm in water, and share few compiled engines, so that thousands run in minutes. `constants` counts
-in how many of them an outcome depends on a constant of the engine.
+in how many of them an outcome depends on a constant of the engine. With ``--errors`` each System
+without kicks runs again at a thousandth of its tolerance, and its error is held against the stated
+one; motions that amplify a difference more than tenfold are counted apart.
 """
 
 import math
@@ -42,6 +45,7 @@ from flocsim.forces import (
     VanDerWaals,
 )
 from flocsim.integrators import BackwardEuler, DormandPrince54, Implicit, Status
+from flocsim.integrators.amplification import MOST_AMPLIFIED, end_distance
 from flocsim.swarms.placement import place_at_random
 
 SEED = 20261128
@@ -52,6 +56,12 @@ DENSITY = 2650.0
 
 STEP_BUDGET = 20_000
 """Steps after which a scene ends as STEP_BUDGET."""
+
+FINER, FINEST = 1e-3, 1e-14
+"""Tolerance of what counts as exact, over that of the scene, and the least [m]."""
+
+NUDGE, UNTOUCHED = 1e-10, 1e-17
+"""How far a companion starts from an exact run, and what differs by rounding [m]."""
 
 TOGETHER = 1e-8
 """Bodies nearer than this gap [m] at the end are together: contacts are less than 1 nm deep, and
@@ -462,6 +472,46 @@ def scene_of(number: int) -> RandomScene:
     return RandomScene(number, family, *FAMILIES[family](draw))
 
 
+def error_of(scene, end):
+    """Return (true error, stated error [m], amplification) of how a scene ended, the last only
+    where it matters; None where there is nothing to hold it against."""
+    system = scene.system
+    thermal = any(isinstance(force, Thermal) for force in system.forces)
+    if isinstance(system, Swarm) or thermal or not end.is_right:
+        return None
+    finest = max(FINER * system.integrator.tolerance, FINEST)
+    exact = attrs.evolve(system, integrator=Implicit(finest))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PlausibilityWarning)
+        best = exact.run(scene.until, max_steps=20 * STEP_BUDGET, record=False)
+        if best.status != Status.FINISHED:
+            return None
+        true, growth = end_distance(system.bodies, end.position, best.position[-1]), 0.0
+        if true > max(end.error, UNTOUCHED):
+            growth = exact.amplification(
+                scene.until, best.position[-1], 20 * STEP_BUDGET, nudge=NUDGE
+            )
+    return true, end.error, growth
+
+
+def print_errors(found):
+    """Print in how many scenes of each family the stated error covers the true one."""
+    rows = []
+    for name in NAMES:
+        own = [error_of(scene, end) for scene, end, _ in found if scene.family == name]
+        known = [each for each in own if each is not None]
+        amplified = sum(growth >= MOST_AMPLIFIED for *_, growth in known)
+        beyond = sum(
+            true > max(stated, UNTOUCHED) and growth < MOST_AMPLIFIED
+            for true, stated, growth in known
+        )
+        if known:
+            rows.append([name, str(len(known)), str(amplified), str(beyond)])
+    Table("Stated errors", ("family", "scenes", "amplified", "beyond"), rows).print()
+    scenes, amplified, beyond = np.array([row[1:] for row in rows], int).sum(axis=0)
+    print(f"within the stated error: {100.0 - 100.0 * beyond / (scenes - amplified):.2f} %")
+
+
 def family_row(name, found):
     """Return one row of the table: how the scenes of a family ended."""
     ends = [end for _, end, _ in found]
@@ -477,7 +527,9 @@ def family_row(name, found):
 
 def main():
     """Print how the scenes of each family end, and those that do not reach their time."""
-    options = begin(__doc__, scenes=2000, first=0, family={"choices": NAMES})
+    options = begin(
+        __doc__, scenes=2000, first=0, family={"choices": NAMES}, errors={"action": "store_true"}
+    )
     count = 150 if options.quick else options.scenes
     numbers = range(options.first, options.first + count)
     found = []
@@ -492,6 +544,8 @@ def main():
     for scene, end, _ in found:
         if not end.is_right:
             print(f"scene {scene.number} ({scene.family}): {end.status} after {end.steps} steps")
+    if options.errors:
+        print_errors(found)
 
 
 if __name__ == "__main__":
