@@ -187,10 +187,13 @@ class Run:
     @property
     def error(self) -> float:
         """Stated error of the motion [m]; inf where nothing is known of it (see known_error)."""
+        stated, sizes = float(self.clock.error), self.scene.bodies["bounding_radius"]
+        # Below the size of a body it is known.
+        if stated <= sizes.max():
+            return stated
         start, now = self.saved[0][0], self.row_now()[0]
         velocity = np.stack([row[1:].reshape(-1, 6)[:, 3:] for row in (start, now)])
-        sizes, elapsed = self.scene.bodies["bounding_radius"], now[0] - start[0]
-        return float(known_error(np.array(self.clock.error), velocity, sizes, elapsed))
+        return float(known_error(np.array(stated), velocity, sizes, now[0] - start[0]))
 
     @property
     def code(self) -> int:

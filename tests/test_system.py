@@ -10,6 +10,7 @@ from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaal
 from flocsim.geometry.contact import points as contacts
 from flocsim.hooks import HOOKS, compiled_calls
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
+from flocsim.run import known_error
 from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import ELASTIC, PolygonSystem, head_on, hook, star
 
@@ -164,3 +165,11 @@ def test_only_hooks_can_be_replaced():
     marked = set(System(head_on(), [ELASTIC]).fillings()) | set(compiled_calls(True))
     assert marked <= set(HOOKS.values())
     assert "flocsim.hooks.attempt" in HOOKS
+
+
+def test_an_error_beyond_the_reach_of_the_bodies_is_not_known():
+    velocity = np.zeros((2, 1, 3))
+    velocity[1, 0] = 3e-3, 4e-3, 10.0
+    # 2 s at 5 mm/s and 10 rad/s of 10 µm, and these.
+    stated = known_error(np.array([0.0102, 0.0103]), velocity, np.array([1e-5]), 2.0)
+    assert stated.tolist() == [0.0102, np.inf]
