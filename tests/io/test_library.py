@@ -26,11 +26,12 @@ PIXEL = 0.95e-6
 
 
 def picture():
-    """Two bright flocs on black: an L and a disk."""
+    """Two flocs on black, an L and a disk, shaded so that they are no lettering."""
     grey = np.zeros((60, 80))
-    grey[10:40, 10:18] = grey[32:40, 10:35] = 0.9
+    grey[10:40, 10:18] = grey[32:40, 10:35] = 0.6
     y, x = np.mgrid[:60, :80]
-    grey[np.hypot(x - 60, y - 25) < 9] = 0.9
+    disk = np.hypot(x - 60, y - 25) < 9
+    grey[disk] = 0.7 + 0.02 * (x - 60)[disk]
     return grey
 
 
