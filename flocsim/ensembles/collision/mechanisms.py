@@ -85,8 +85,9 @@ class Settling(Encounter):
                 "pair that has passed may meet again; give another law, or let a flow bring the "
                 "bodies together"
             )
-        fastest = max(math.hypot(*velocity) for velocity, _ in self.settling)
-        if not self.speed > SAME_SPEED * fastest:
+        # Along the drift: across it, something else may carry both.
+        fastest = max(abs(velocity @ self.drift) for velocity, _ in self.settling)
+        if not self.speed**2 > SAME_SPEED * fastest:
             raise UsageError(
                 "the two bodies settle at the same speed and never meet, as their speeds differ by "
                 f"less than {100.0 * SAME_SPEED:g} %: give scene.pairs two different radii, set "
