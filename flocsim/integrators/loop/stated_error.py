@@ -66,6 +66,10 @@ FRICTION_UNCERTAINTY = 0.1
 """Fraction of the friction of a sliding contact that counts as uncertain in steps across events."""
 
 
+SLOWEST_OPENING = 0.25
+"""Least rate with which a contact may have opened in a step, over that at its end."""
+
+
 def propagate_sums(work, body, step):
     """Propagate the sums of a body's errors over a step: E_x += E_v τ (1 − e^(−h/τ)), E_v *=
     e^(−h/τ)."""
@@ -241,7 +245,8 @@ def uncertain_time(work, row, step, overlap_uncertainty, resolved):
     if has_switched(work, row):
         # The rate at the end of a long step may be wrong by many times itself.
         way = abs(gap - work.contacts[row].start_gap)
-        speed = min(abs(normal_rate(work, NOW, row)), way / step)
+        rate = abs(normal_rate(work, NOW, row))
+        speed = max(min(rate, way / step), SLOWEST_OPENING * rate)
         return min((abs(gap) + overlap_uncertainty) / speed, step) if speed > 0.0 else step
     # It did not: uncertain all along if the overlap is within its error.
     deepest = max(
