@@ -58,6 +58,9 @@ LEAST_VECTOR = 0.01
 """Lower bound of the vector's size, since its parts may cancel by chance, as a fraction of the
 tolerance, and of the sum of switching errors (a dozen grazes push it to and fro)."""
 
+LEAST_STATED = 0.1
+"""Least stated error once bodies have touched, over the tolerance."""
+
 UNCERTAIN_OVERLAP = 2.0
 """A contact may be open if its overlap is below this multiple of its gap's error."""
 
@@ -192,7 +195,7 @@ def propagate_errors(scene, work, clock, step):
             stated = min(stated, VECTOR_SAFETY * own)
         # Once bodies have touched, iterations and located events leave what no estimate sees.
         if errors.switch_displacement > 0.0:
-            stated = max(stated, LEAST_VECTOR * clock.tolerance)
+            stated = max(stated, LEAST_STATED * clock.tolerance)
         errors.stated = stated
         clock.error = max(clock.error, stated)
 

@@ -139,4 +139,4 @@ def test_what_a_contact_takes_up_is_no_longer_stated():
     sums += stated_error.SWITCH_AMPLIFICATION * errors["switch_displacement"]
     true = end_distance(bodies, run.motion()[1][-1], exact.position[-1])
     assert abs(run.work.place[PROPAGATED, 1, Y]) < 0.05 * sums.max()
-    assert true <= run.error <= max(sums.max(), stated_error.LEAST_VECTOR * 1e-9)
+    assert true <= run.error <= max(sums.max(), stated_error.LEAST_STATED * 1e-9)
