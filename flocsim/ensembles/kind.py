@@ -220,7 +220,11 @@ class StudyKind:
     @property
     def flocs_in_words(self) -> str:
         """Return which flocs the study takes."""
-        return str(self.config.shapes.described(len(self.flocs), None, self.scene.is_measured))
+        return str(
+            self.config.shapes.described(
+                len(self.flocs), None, getattr(self.scene, "is_measured", False)
+            )
+        )
 
     @property
     def source(self) -> dict[str, Any]:

@@ -117,6 +117,9 @@ class DormandPrince54(Adaptive):
     Equations I (1993), table II.5.2.
     """
 
+    # Without a propagated vector the sums of estimates fell short by up to 1.8 times.
+    estimate_share = 2.0
+
     @staticmethod
     def attempt(scene, work, clock, step):
         """Take one step; return its error over the tolerance, or −1 where the motion is no longer
