@@ -22,9 +22,12 @@ from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import NEW, NOW
 
 KINK_FINENESS = 1e-4
-"""A kink is located to this fraction of its distance at the start of the step, and of the value of
-the event function for the same overlap at rest. With 1e-6 of that some steps ended there for
-ever."""
+"""A kink is located to this fraction of its distance at the start of the step."""
+
+KINK_ROUNDING = 1e-6
+"""An event function within this fraction of its value for the same overlap at rest counts as zero:
+its sign may be rounding, and steps would end there for ever. With 2e-5 strongly damped impacts are
+wrong by 1e-7."""
 
 
 def switch_resolutions(work, clock):
@@ -58,7 +61,7 @@ def kink_share(scene, work, row, which):
     nearer, further = min(abs(before), abs(after)), max(abs(before), abs(after))
     at_rest = contact_event(scene, view_without_slip(view, view.overlap, 0.0), which)
     # An overlap is known to the rounding of coordinates.
-    fineness = max(KINK_FINENESS, at_least_rounding(work, NOW, 0.0) / view.overlap)
+    fineness = max(KINK_ROUNDING, at_least_rounding(work, NOW, 0.0) / view.overlap)
     negligible = max(KINK_FINENESS * further, fineness * abs(at_rest))
     if before * after >= 0.0 or nearer <= negligible:
         return math.inf
