@@ -37,7 +37,7 @@ from flocsim.geometry.shapes.shape import Sphere
 from flocsim.hydrodynamics.pair import SpherePair
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Overdamped
-from flocsim.integrators.loop.kicks import overshoot
+from flocsim.integrators.loop.kicks import seen_escape
 from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.integrators.rhs.views import centre_line
 from flocsim.io.confidence import wilson
@@ -327,7 +327,7 @@ def brownian_meetings(
     first = system.begin(
         math.inf, max_steps=max_steps, observer=OBSERVER, jit=jit, observed=observed
     )  # fmt: skip
-    observed[ESCAPE] -= min(overshoot(first.scene.kicks, far - touch), 0.5 * (far - near))
+    observed[ESCAPE] = seen_escape(first.scene.kicks, touch, near, far)
     codes, times, steps = [], [], 0
     for replicate in range(replicates):
         run = placed(first, near, seed, replicate)

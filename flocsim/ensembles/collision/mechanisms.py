@@ -43,7 +43,7 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import SpherePair, bend, bend_in_flow
 from flocsim.hydrodynamics.pair import interpolation_weights, node_radii
 from flocsim.hydrodynamics.two_spheres import FADES_FROM
-from flocsim.integrators.loop.kicks import overshoot
+from flocsim.integrators.loop.kicks import seen_escape
 from flocsim.system import System
 
 SAME_SPEED = 5e-4
@@ -365,9 +365,8 @@ class Brownian(Weightless):
     @functools.cached_property
     def given(self) -> np.ndarray:
         observed = super().given
-        near, far = self.ends
-        seen = min(overshoot(self.scene.kicks, far - self.size), 0.5 * (far - near))
-        observed[outcomes.BROWNIAN], observed[outcomes.ESCAPE] = 1.0, far - seen
+        observed[outcomes.BROWNIAN] = 1.0
+        observed[outcomes.ESCAPE] = seen_escape(self.scene.kicks, self.size, *self.ends)
         return observed
 
     def longest(self, share: float) -> float:

@@ -39,12 +39,16 @@ OVERSHOOT = 0.5826
 as it may have crossed it within a kick (Broadie, Glasserman and Kou 1997, Math. Finance 7, 325)."""
 
 
-def overshoot(kicks, gap):
-    """Return how much further away [m] bodies are when they are first seen beyond a distance,
-    ``gap`` being the gap between them there; ``kicks``: those of a Scene."""
+def seen_escape(kicks, touch, near, far):
+    """Return the distance [m] of two bodies at which kicks show that they have been ``far`` apart.
+
+    They touch at the distance ``touch``, and have begun at ``near``; ``kicks``: those of a Scene.
+    """
     kick, halvings, spread, least = kicks
-    near = max(SHARE_OF_GAP * gap, least) if halvings > 0.0 else math.inf
-    return OVERSHOOT * min(math.sqrt(spread * kick), near)
+    resolved = max(SHARE_OF_GAP * (far - touch), least) if halvings > 0.0 else math.inf
+    overshoot = OVERSHOOT * min(math.sqrt(spread * kick), resolved)
+    # Kicks may be longer than the whole way.
+    return far - min(overshoot, 0.5 * (far - near))
 
 
 def has_kicks(scene):
