@@ -66,11 +66,13 @@ UNCERTAIN_OVERLAP = 2.0
 
 
 FRICTION_UNCERTAINTY = 0.1
-"""Fraction of the friction of a sliding contact that counts as uncertain in steps across events."""
-
+"""Fraction of the friction of a sliding contact that counts as uncertain in steps across events. As
+much as .04 was lacking in a limit cycle that took 90,000 steps to resolve; with 0.1 the stated error covered
+100 random pairs that slide on each other."""
 
 SLOWEST_OPENING = 0.25
-"""Least rate with which a contact may have opened in a step, over that at its end."""
+"""Least rate with which a contact may have opened in a step, over that at its end. Without
+it a long step in which the gap hardly changed counted as uncertain all along."""
 
 
 def propagate_sums(work, body, step):
@@ -214,6 +216,13 @@ def add_impulse_error(scene, work, body, impulse, switched):
             errors.uncertain_velocity += impulse * share
 
 
+def add_impulse_errors(scene, work, row, impulse, switched):
+    """Add the velocity errors due to an impulse [N s] at a contact to both of its bodies."""
+    candidate = work.candidates[row]
+    add_impulse_error(scene, work, candidate.vertex_body, impulse, switched)
+    add_impulse_error(scene, work, candidate.edge_body, impulse, switched)
+
+
 def add_propagated_impulse(scene, work, body, x, y, turn):
     """Add an impulse [N s, N s, N m s] to a body's propagated error."""
     if scene.bodies[body].free == 1.0:
@@ -288,12 +297,10 @@ def signed_excess_time(work, row, step, depth, overlap_uncertainty):
 def add_grazing_uncertainty(scene, work, row, step):
     """Count all that the tangential force of a grazing pair did in a step as an error: by the law
     the pair loses it whenever it parts, and what it lifted presses instead."""
-    candidate = work.candidates[row]
     force = grazing_force(work, NOW, row)
     impulse = step * length_of(lifted_load(scene, work, row, force), force)
     impulse *= GRAZING_AMPLIFICATION / SWITCH_AMPLIFICATION
-    add_impulse_error(scene, work, candidate.vertex_body, impulse, True)
-    add_impulse_error(scene, work, candidate.edge_body, impulse, True)
+    add_impulse_errors(scene, work, row, impulse, True)
 
 
 def reset_slip_offsets(work):
@@ -322,8 +329,7 @@ def add_friction_uncertainty(scene, work, clock, step):
         if slides and abs(rate) * step > NEGLIGIBLE * clock.tolerance:
             _, friction = contact_force(scene, contact_view(scene, work, NOW, row))
             impulse = FRICTION_UNCERTAINTY * step * abs(friction)
-            add_impulse_error(scene, work, work.candidates[row].vertex_body, impulse, False)
-            add_impulse_error(scene, work, work.candidates[row].edge_body, impulse, False)
+            add_impulse_errors(scene, work, row, impulse, False)
 
 
 def add_switch_errors(scene, work, clock, step, depth):
@@ -347,6 +353,5 @@ def add_switch_errors(scene, work, clock, step, depth):
             normal, tangential = contact_force(scene, contact_view(scene, work, NOW, row))
             impulse = delay * length_of(normal, tangential)
             switched = has_switched(work, row)
-            add_impulse_error(scene, work, candidate.vertex_body, impulse, switched)
-            add_impulse_error(scene, work, candidate.edge_body, impulse, switched)
+            add_impulse_errors(scene, work, row, impulse, switched)
             add_pair_impulse(scene, work, row, signed * normal, signed * tangential)
