@@ -66,9 +66,9 @@ UNCERTAIN_OVERLAP = 2.0
 
 
 FRICTION_UNCERTAINTY = 0.1
-"""Fraction of the friction of a sliding contact that counts as uncertain in steps across events. As
-much as .04 was lacking in a limit cycle that took 90,000 steps to resolve; with 0.1 the stated error covered
-100 random pairs that slide on each other."""
+"""Fraction of the friction of a sliding contact that counts as uncertain in steps across events.
+As much as .04 was lacking in a limit cycle that took 90,000 steps to resolve; with 0.1 the stated
+error covered 100 random pairs that slide on each other."""
 
 SLOWEST_OPENING = 0.25
 """Least rate with which a contact may have opened in a step, over that at its end. Without
