@@ -238,6 +238,16 @@ def test_the_outline_lies_in_the_middle_of_its_play():
         assert fit.shape.area == pytest.approx(mask.sum(), rel=0.02)
 
 
+@pytest.mark.parametrize("radius", [0.5, 1.0, 2.0])
+def test_more_vertices_are_not_worse_on_small_flocs(radius):
+    masks = [blob(seed, size=19, radius=4.0) for seed in range(8)]
+    wrong = [
+        sum(fit_mask(mask, vertices=n, radius=radius).wrong_pixels for mask in masks)
+        for n in (8, 16, 28, 40, 64, 128)
+    ]
+    assert wrong == sorted(wrong, reverse=True)
+
+
 @pytest.mark.slow
 def test_turned_and_mirrored_masks_fit_as_well():
     for seed in range(2):
