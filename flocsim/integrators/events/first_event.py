@@ -11,23 +11,23 @@ import math
 
 from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.geometry.contact.points import least_listed_gap
-from flocsim.hooks import SLIP_LIMIT, awaits_touch, contact_event, has
+from flocsim.hooks import SLIP_LIMIT, awaits_touch, contact_event, contact_force, has
 from flocsim.integrators.events.crossings import first_switch
 from flocsim.integrators.events.grazes import START_FRACTION, grazing_end_share
 from flocsim.integrators.events.resolution import OVERLAP_FRACTION, RESOLUTION
 from flocsim.integrators.rhs.error import at_least_rounding, step_tolerance
 from flocsim.integrators.rhs.friction import set_sliding, slip_transition
-from flocsim.integrators.rhs.views import contact_view, view_without_slip
+from flocsim.integrators.rhs.views import contact_view, velocity_lifetime_of, view_without_slip
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import NEW, NOW
 
 KINK_FINENESS = 1e-4
 """A kink is located to this fraction of its distance at the start of the step."""
 
-KINK_ROUNDING = 1e-6
-"""An event function within this fraction of its value for the same overlap at rest counts as zero:
-its sign may be rounding, and steps would end there for ever. With 2e-5 strongly damped impacts are
-wrong by 1e-7."""
+KINK_EFFECT = 1e-6
+"""A kink counts only if the contact's force in the step moves the bodies by more than this fraction
+of the tolerance. Contacts that open again at overlaps of rounding would shorten steps for ever; a
+larger fraction shows in strongly damped impacts."""
 
 
 def switch_resolutions(work, clock):
@@ -48,7 +48,19 @@ def switch_resolutions(work, clock):
     return resolution, max(resolution, min(SHALLOWEST_TOUCH, clock.tolerance))
 
 
-def kink_share(scene, work, row, which):
+def is_force_felt(scene, work, clock, step, row):
+    """Return True if the force of a contact within a step moves its bodies by more than
+    KINK_EFFECT of the tolerance, at once or later."""
+    largest = 0.0
+    for state in (NOW, NEW):
+        normal, tangential = contact_force(scene, contact_view(scene, work, state, row))
+        largest = max(largest, abs(normal), abs(tangential))
+    mass = contact_view(scene, work, NOW, row).effective_mass
+    displacement = largest * step / mass * (step + velocity_lifetime_of(work, row))
+    return displacement > KINK_EFFECT * clock.tolerance
+
+
+def kink_share(scene, work, clock, step, row, which):
     """Return the fraction of the step at which one contact passes one kink, by linear
     interpolation.
 
@@ -57,13 +69,13 @@ def kink_share(scene, work, row, which):
     view = contact_view(scene, work, NOW, row)
     before = contact_event(scene, view, which)
     after = contact_event(scene, contact_view(scene, work, NEW, row), which)
-    # Too near to either end to be told from rounding.
+    # Too near to either end to be told from rounding: an overlap is known to that of coordinates.
     nearer, further = min(abs(before), abs(after)), max(abs(before), abs(after))
     at_rest = contact_event(scene, view_without_slip(view, view.overlap, 0.0), which)
-    # An overlap is known to the rounding of coordinates.
-    fineness = max(KINK_ROUNDING, at_least_rounding(work, NOW, 0.0) / view.overlap)
-    negligible = max(KINK_FINENESS * further, fineness * abs(at_rest))
-    if before * after >= 0.0 or nearer <= negligible:
+    rounding = at_least_rounding(work, NOW, 0.0) / view.overlap
+    if before * after >= 0.0 or nearer <= max(KINK_FINENESS * further, rounding * abs(at_rest)):
+        return math.inf
+    if not is_force_felt(scene, work, clock, step, row):
         return math.inf
     # Aim past the kink, so that the next step begins behind it.
     return (1.0 + 0.5 * KINK_FINENESS) * before / (before - after)
@@ -83,7 +95,7 @@ def first_law_share(scene, work, clock, step):
             share = min(share, (1.0 + START_FRACTION) * end)
         if mode == CLOSED:
             for which in range(scene.events):
-                share = min(share, kink_share(scene, work, row, which))
+                share = min(share, kink_share(scene, work, clock, step, row, which))
             # Sliding and sticking, if there is a Coulomb limit.
             if has(scene, SLIP_LIMIT):
                 distance, transition = slip_transition(scene, work, row, step)
