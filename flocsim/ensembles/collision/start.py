@@ -18,12 +18,8 @@ from flocsim.errors import ZoneError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.base import Force
 from flocsim.geometry.contact.core_points import outlines_of
-from flocsim.geometry.contact.near_pairs import core_distance
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.state.scene import Scene
-
-MOST_ADVANCES = 1000
-"""Moves towards the wanted gap; each is as long as the distance still allows."""
 
 LARGEST_RATIO = 4.0 / math.e**2
 """S above which attraction wins at every distance."""
@@ -57,27 +53,57 @@ def largest_displacement(
     return half_extent(shape_i, angle_i, 1.0) + half_extent(shape_j, angle_j, -1.0)
 
 
+def top_of_edge(ax, ay, bx, by, radius, x):
+    """Return the height [m] at which a disk of a radius around the edge from a to b ends above x,
+    −inf beside it."""
+    if x < min(ax, bx) - radius or x > max(ax, bx) + radius:
+        return -math.inf
+    top, length = -math.inf, math.hypot(bx - ax, by - ay)
+    # The disks around both ends.
+    if abs(x - ax) <= radius:
+        top = ay + math.sqrt(radius * radius - (x - ax) * (x - ax))
+    if abs(x - bx) <= radius:
+        top = max(top, by + math.sqrt(radius * radius - (x - bx) * (x - bx)))
+    # The side between them, which is the edge shifted along its upper normal.
+    if bx != ax:
+        along = (x - ax) / (bx - ax) + radius * (by - ay) / (length * abs(bx - ax))
+        if 0.0 <= along <= 1.0:
+            top = max(top, ay + along * (by - ay) + radius * abs(bx - ax) / length)
+    return top
+
+
 def start_height(bodies, angle_i, angle_j, contact, reach, displacement, gap):
-    """Return the height of j's centroid over i's [m] at which the outlines are ``gap`` apart.
+    """Return the height of j's centroid over i's [m] at which the outlines are ``gap`` apart as j
+    comes straight down.
 
     ``bodies``: the Scene of i and j, or their Outlines; ``contact`` = r_i + r_j of the
-    spheroradii; ``reach`` = R_i + R_j. From far above, j comes down by the distance that is left
-    (it cannot overshoot); where it passes without coming so near, it starts clear above.
+    spheroradii; ``reach`` = R_i + R_j. Where j passes without coming so near, it starts clear
+    above.
     """
+    vertices, highest = bodies.vertices, -math.inf
+    ci, si, cj, sj = math.cos(angle_i), math.sin(angle_i), math.cos(angle_j), math.sin(angle_j)
+    # The highest of all contacts of a vertex of one with an edge of the other, widened by the sum
+    # of their radii and the gap.
+    for point in range(bodies.first[1], bodies.first[2]):
+        end = point + vertices[point].edge_offset
+        x = displacement + cj * vertices[point].x - sj * vertices[point].y
+        y = sj * vertices[point].x + cj * vertices[point].y
+        end_x = displacement + cj * vertices[end].x - sj * vertices[end].y
+        end_y = sj * vertices[end].x + cj * vertices[end].y
+        for other in range(bodies.first[0], bodies.first[1]):
+            stop = other + vertices[other].edge_offset
+            low_x = ci * vertices[other].x - si * vertices[other].y
+            low_y = si * vertices[other].x + ci * vertices[other].y
+            stop_x = ci * vertices[stop].x - si * vertices[stop].y
+            stop_y = si * vertices[stop].x + ci * vertices[stop].y
+            wide = contact + gap + vertices[point].excess_radius + vertices[other].excess_radius
+            if max(low_y, stop_y) + wide - y > highest:
+                highest = max(highest, top_of_edge(low_x, low_y, stop_x, stop_y, wide, x) - y)
+            # The other's vertex under the edge: mirrored, it is above.
+            if low_y + wide - min(y, end_y) > highest:
+                highest = max(highest, low_y + top_of_edge(x, -y, end_x, -end_y, wide, low_x))
     clear = reach + gap
-    height = math.sqrt(max(clear * clear - displacement * displacement, 0.0))
-    turn_c, turn_s = math.cos(angle_j - angle_i), math.sin(angle_j - angle_i)
-    c, s = math.cos(angle_i), math.sin(angle_i)
-    # Sphere tracing: the distance at a place is free of contact in any direction.
-    for _ in range(MOST_ADVANCES):
-        x, y = c * displacement + s * height, c * height - s * displacement
-        left = core_distance(bodies, 1, 0, (turn_c, turn_s, x, y)) - contact - gap
-        if left <= 1e-6 * gap:
-            return height
-        height -= left
-        if height < -clear:
-            break
-    return clear
+    return highest if highest > -clear else clear
 
 
 def place_pair(
