@@ -161,7 +161,7 @@ def _require_one_region(mask: object) -> np.ndarray:
     regions = label(mask, structure=np.ones((3, 3)))[1]
     if regions != 1:
         raise ShapeError(f"a mask must hold one floc, found {regions} separate regions")
-    return mask.astype(bool)
+    return mask.astype(bool, order="C")
 
 
 def _check_options(vertices, radius, method):

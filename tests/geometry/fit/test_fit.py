@@ -238,6 +238,12 @@ def test_the_outline_lies_in_the_middle_of_its_play():
         assert fit.shape.area == pytest.approx(mask.sum(), rel=0.02)
 
 
+def test_the_order_of_a_mask_in_memory_does_not_matter():
+    mask = blob(0)
+    fits = [fit_mask(each, vertices=6) for each in (mask, np.asfortranarray(mask))]
+    assert np.array_equal(fits[0].vertices, fits[1].vertices)
+
+
 @pytest.mark.parametrize("radius", [0.5, 1.0, 2.0])
 def test_more_vertices_are_not_worse_on_small_flocs(radius):
     masks = [blob(seed, size=19, radius=4.0) for seed in range(8)]
