@@ -280,9 +280,7 @@ def pattern_fit(
             descend(sums, vertices, radius, DIRECTIONS, DESCENT)
             trials.append(counted(vertices))
         begin = [vertices for vertices, _ in _lowest(trials, LOWERED)]
-        for vertices in annealed_runs(sums, begin, radius, int(mask.sum())):
-            descend(sums, vertices, radius, DIRECTIONS, FINE)
-            trials.append(counted(vertices))
+        trials += map(counted, annealed_runs(sums, begin, radius, int(mask.sum())))
     else:
         trials += [searched(mask, start, radius, COARSE, weights) for start, _ in trials]
     fine = [searched(mask, trial, radius, FINE, weights) for trial, _ in _lowest(trials, FINALISTS)]
