@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from flocsim.compiler.by_pointer import keep
 from flocsim.compiler.composer import compose
 from flocsim.compiler.linker import where
 from flocsim.forces.check import describe_sample
@@ -25,7 +26,19 @@ from flocsim.integrators.rhs.surface_gap import flag_near, pair_end, surface_vie
 from flocsim.integrators.rhs.views import body_view, centre_view, contact_view
 from flocsim.state.clock import NOT_COMPILED, NOTHING_FULL
 from flocsim.state.scene import Scene
-from flocsim.state.work import NOW, Work, copy_of, counts_as_pair, motion_of, put_motion, with_room
+from flocsim.state.work import (
+    NOW,
+    Work,
+    begin_anew,
+    copy_of,
+    counts_as_pair,
+    motion_of,
+    put_motion,
+    with_room,
+)
+
+Motion = tuple[np.ndarray, np.ndarray]
+"""Positions and velocities of n bodies, (n, 3) each."""
 
 STEPS_AT_A_TIME = 5_000
 """Steps between two checks whether to continue: some 50 ms. The record has a row for each."""
@@ -85,8 +98,9 @@ class Run:
         observed: np.ndarray | None = None,
         record: bool = False,
     ) -> None:
-        self.driver, self.scene, self.work = driver, scene, work
+        self.driver, self.scene, self.work, self.integrator = driver, scene, work, integrator
         self.clock, self.counts = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
+        self.fresh = self.clock.copy(), self.counts.copy()
         self.clock.until = until
         self.observed = np.zeros(1) if observed is None else observed
         n = len(scene.bodies)
@@ -94,9 +108,35 @@ class Run:
         self.record = np.zeros((STEPS_AT_A_TIME if record else 0, 1 + 6 * n))
         self.saved = [self.row_now()]
 
+    def restart(
+        self, driver: Callable[..., int], scene: Scene, motion: Motion, integrator: Integrator,
+        until: float, max_steps: int, observed: np.ndarray,
+    ) -> None:  # fmt: skip
+        """Begin another run of as many bodies in the same arrays, which costs less than new ones.
+
+        ``motion``: positions and velocities at the start, (n, 3) each. Others: as in Run.
+        """
+        if integrator is not self.integrator:
+            self.integrator = integrator
+            self.fresh = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
+        self.driver, self.scene = driver, scene
+        begin_anew(self.work, scene, *motion)
+        self.clock.base[0], self.counts.base[0] = self.fresh
+        self.clock.until, self.counts.max_steps = until, max_steps
+        self.observed[:] = observed
+        self.saved = [self.row_now()]
+
+    def keep(self, owner: Any) -> None:
+        """Have calls of the driver remember where the arrays are, as long as ``owner`` lives."""
+        for each in (self.work, self.observed, self.clock, self.counts, self.record):
+            keep(each, owner)
+
     def row_now(self) -> np.ndarray:
         """Return the present time and state as one row of a record."""
-        return np.array([[self.clock.time, *motion_of(self.work, NOW).ravel()]])
+        row = np.empty((1, 1 + 6 * len(self.scene.bodies)))
+        row[0, 0], states = self.clock.time, row[0, 1:].reshape(-1, 6)
+        states[:, :3], states[:, 3:] = self.work.place[NOW], self.work.velocity[NOW]
+        return row
 
     def advance(self, steps: int | None = None) -> Status:
         """Advance by so many steps; return PAUSED, or the Status with which the run has ended for

@@ -25,6 +25,7 @@ from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit, VelocityVerlet
 from flocsim.integrators.base import Status
+from flocsim.state.work import work_of
 
 TIGHT = 1e-12
 TOLERANCES = (1e-8, 1e-9, 1e-10, 1e-11)
@@ -57,7 +58,8 @@ def verlet(cases, exact, allowed, budget):
 def run_scipy(runner, case, name, tolerance, budget):
     """(outcome, CPU time) of one replicate by a SciPy solver."""
     encounter = case.encounter
-    observed, work = encounter.observed(), encounter.start(case.angles, case.share)
+    observed = encounter.given.copy()
+    work = work_of(encounter.scene, *encounter.motion(case.angles, case.share))
     until = encounter.time_limit()
     runner.system = encounter.system
     end, code = runner.run(name, tolerance, until, budget, work=work, observed=observed)

@@ -11,24 +11,28 @@ import ctypes
 import functools
 import struct
 import weakref
-from collections.abc import Sequence
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
 from flocsim.errors import KernelError
 
+DOUBLE = struct.Struct("@d")
+
 
 class Kept(NamedTuple):
-    """What is remembered of a tuple of arrays and records; see `keep`."""
+    """What is remembered of an argument; see `keep`."""
 
-    value: tuple[Any, ...]
-    words: list[Any]  # its part of a table
-    kinds: tuple[Any, ...]  # the types of these
+    value: Any
+    table: bytes  # its part of a table
+    kinds: int  # place of its types in KINDS: comparing these would take longer than all else
 
 
 KEPT: dict[int, Kept] = {}
-"""{id of a tuple: what is remembered of it}."""
+"""{id of an argument: what is remembered of it}."""
+
+KINDS: list[tuple[Any, ...]] = []
+"""The types of all arguments that have been remembered, each once."""
 
 
 def as_plain(value: Any) -> Any:
@@ -52,12 +56,15 @@ def address_of(value: Any) -> int:
     return int(plain.ctypes.data)
 
 
-def keep(value: tuple[Any, ...], owner: Any) -> None:
-    """Remember what a tuple is in tables while its owner lives: they are then made in a fraction of
-    the time. Its arrays may not be exchanged meanwhile."""
+def keep(value: Any, owner: Any) -> None:
+    """Remember what an array, a record or a tuple of such is in tables while its owner lives: they
+    are then made in a fraction of the time. Its arrays may not be exchanged meanwhile."""
     if id(value) not in KEPT:
-        # The entry holds the tuple itself, so that no other object is given its id meanwhile.
-        KEPT[id(value)] = Kept(value, *table_of(value))
+        words, kinds = flat(value)
+        if kinds not in KINDS:
+            KINDS.append(kinds)
+        # The entry holds the argument itself, so that no other object is given its id meanwhile.
+        KEPT[id(value)] = Kept(value, packed(words), KINDS.index(kinds))
         weakref.finalize(owner, KEPT.pop, id(value), None)
 
 
@@ -82,10 +89,6 @@ def flatten(value, words, kinds):
         words.append(address_of(value))
         kinds.append(value.dtype)
     elif isinstance(value, tuple):
-        if (kept := KEPT.get(id(value))) is not None:
-            words += kept.words
-            kinds += kept.kinds
-            return
         kinds.append((type(value), len(value)))
         for each in value:
             flatten(each, words, kinds)
@@ -96,18 +99,38 @@ def flatten(value, words, kinds):
         kinds.append(letter)
 
 
-def table_of(arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[Any, ...]]:
-    """Return the arguments as the words of a table, and their types as a flat tuple: a tuple is
-    (its class, its length) before its items, an array (its dtype, its dimensions)."""
+def flat(value: Any) -> tuple[list[Any], tuple[Any, ...]]:
+    """Return an argument as words, and their types as a flat tuple: a tuple is (its class, its
+    length) before its items, an array (its dtype, its dimensions)."""
     words: list[Any] = []
     kinds: list[Any] = []
-    flatten(arguments, words, kinds)
+    flatten(value, words, kinds)
     return words, tuple(kinds)
 
 
-def layout_of(words: Sequence[Any]) -> struct.Struct:
-    """Return what packs words of such types."""
-    return struct.Struct("@" + "".join("d" if isinstance(each, float) else "q" for each in words))
+def packed(words: list[Any]) -> bytes:
+    """Return words as they lie in a table."""
+    letters = ("d" if isinstance(each, float) else "q" for each in words)
+    return struct.pack("@" + "".join(letters), *words)
+
+
+def table_of(arguments: tuple[Any, ...]) -> tuple[bytes, tuple[Any, ...]]:
+    """Return the arguments as a table, and what tells their types: of each those of `flat`, or
+    their place in KINDS."""
+    parts: list[bytes] = []
+    kinds: list[Any] = []
+    for each in arguments:
+        if type(each) is float:
+            parts.append(DOUBLE.pack(each))
+            kinds.append(("d",))
+        elif (kept := KEPT.get(id(each))) is not None:
+            parts.append(kept.table)
+            kinds.append(kept.kinds)
+        else:
+            words, own = flat(each)
+            parts.append(packed(words))
+            kinds.append(own)
+    return b"".join(parts), tuple(kinds)
 
 
 @functools.cache
@@ -122,8 +145,12 @@ def sizes_of(named: Any) -> dict[str, tuple[int, ...]]:
 
 
 def kinds_text(kinds: tuple[Any, ...]) -> str:
-    """Return the types of arguments as text that differs where machine code may: with the names of
-    fields in their order, and sizes that are declared."""
+    """Return the types of arguments, as of table_of, as text that differs where machine code may:
+    with the names of fields in their order, and sizes that are declared."""
     # The repr of a class is its name: two of one name may have other fields.
-    named = [each[0] for each in kinds if isinstance(each, tuple) and hasattr(each[0], "_fields")]
-    return repr((kinds, [(each._fields, sizes_of(each)) for each in named]))
+    all_kinds = [KINDS[each] if isinstance(each, int) else each for each in kinds]
+    flat_kinds = [each for one in all_kinds for each in one]
+    named = [
+        each[0] for each in flat_kinds if isinstance(each, tuple) and hasattr(each[0], "_fields")
+    ]
+    return repr((flat_kinds, [(each._fields, sizes_of(each)) for each in named]))

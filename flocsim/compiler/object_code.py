@@ -10,7 +10,7 @@ that of its arguments. It returns 0, or 1 where it has raised an exception.
 import ctypes
 import hashlib
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from flocsim.compiler.processor import target
@@ -101,17 +101,16 @@ def load(code: ObjectCode, addresses: Mapping[str, int]) -> int:
     return _loaded[key].get_function_address(code.entry)
 
 
-def function_at(
-    entry: int, returned: str, table: struct.Struct
-) -> Callable[[Sequence[Any]], Any]:  # fmt: skip
-    """Return the entry at an address as a function of the words of a table, which runs without the
-    interpreter's lock; ``table`` packs them, ``returned`` is the format of the answer."""
+def function_at(entry: int, returned: str) -> Callable[[bytes], Any]:
+    """Return the entry at an address as a function of a table, which runs without the interpreter's
+    lock; ``returned`` is the format of the answer."""
     call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_char_p)(entry)
     layout = struct.Struct(f"@{returned}")
+    answer_type = ctypes.c_char * max(layout.size, 8)
 
-    def function(words):
-        answer = ctypes.create_string_buffer(layout.size or 8)
-        if call(ctypes.addressof(answer), table.pack(*words)):
+    def function(table):
+        answer = answer_type()
+        if call(answer, table):
             raise KernelError(
                 "a kernel has raised an exception (run uncompiled, with jit=False, it says which)"
             )

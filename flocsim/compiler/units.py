@@ -27,7 +27,7 @@ from typing import Any
 import attrs
 
 from flocsim.compiler import accelerator, disk_cache
-from flocsim.compiler.by_pointer import kinds_text, layout_of, table_of
+from flocsim.compiler.by_pointer import kinds_text, table_of
 from flocsim.compiler.fingerprint import Intrinsic, describe, hashed
 from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import LENT, Called, ObjectCode, function_at, load, object_of
@@ -86,7 +86,7 @@ class Engine:
         return Engine(self.entry, self.name, self.what, True)
 
     def __call__(self, *arguments: Any) -> Any:
-        words, kinds = table_of(arguments)
+        table, kinds = table_of(arguments)
         if kinds not in self.functions:
 
             def given() -> list[Any]:
@@ -95,8 +95,8 @@ class Engine:
                 return type_of(arguments).types
 
             address, returned = self.load(kinds_text(kinds), given, table=True)
-            self.functions[kinds] = function_at(address, returned, layout_of(words))
-        return self.functions[kinds](words)
+            self.functions[kinds] = function_at(address, returned)
+        return self.functions[kinds](table)
 
     def load(
         self, told: str, given: Callable[[], Sequence[Any]], table: bool = False

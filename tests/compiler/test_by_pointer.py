@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pytest
 
-from flocsim.compiler.by_pointer import KEPT, keep, table_of
+from flocsim.compiler.by_pointer import KEPT, keep, kinds_text, table_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import KernelError
 
@@ -96,10 +96,10 @@ class Owner:
 
 def test_what_stays_is_told_alike_until_its_owner_is_gone():
     state, owner = outer(), Owner()
-    words, kinds = table_of((state, 1.5))
+    table, kinds = table_of((state, 1.5))
     keep(state, owner)
-    kept_words, kept_kinds = table_of((state, 1.5))
-    assert words == kept_words and kinds == kept_kinds
+    kept_table, kept_kinds = table_of((state, 1.5))
+    assert table == kept_table and kinds_text(kinds) == kinds_text(kept_kinds)
     assert id(state) in KEPT
     del owner
     assert id(state) not in KEPT

@@ -45,7 +45,7 @@ def test_no_start_is_nearer_than_what_acts_there_is_small(study):
     encounter = study.encounter(0, 1, study.numbers(0))
     for k in range(8):
         share = study.share_of(encounter, 1.0, study.numbers(k))
-        place = encounter.start((0.0, 0.0), share).place[0]
+        place = encounter.motion((0.0, 0.0), share)[0]
         apart = np.hypot(*(place[1, :2] - place[0, :2]))
         assert apart >= (3e-5 + encounter.start_gap) * (1.0 - 1e-6)
 

@@ -228,7 +228,7 @@ def test_two_bodies_are_judged_as_a_pair_of_a_study_is(tmp_path, gap, ends):
             motion = np.hstack([places, np.zeros((2, 3))])
             calm = CALM_SPEED * math.hypot(*encounter.drift)
             motion[1, 3:5] = (0.0, 0.5, 0.9, 1.1)[case % 4] * calm * rng.choice([-0.7, 0.7], 2)
-            work, observed = work_of(scene, places, motion[:, 3:]), encounter.observed()
+            work, observed = work_of(scene, places, motion[:, 3:]), encounter.given.copy()
             assert rebuild_list(scene, work)
             locate_contacts(scene, work, NOW)
             set_modes(scene, work)

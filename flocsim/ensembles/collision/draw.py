@@ -32,7 +32,7 @@ from flocsim.io.results.schema import (
     REPLICATES,
 )
 from flocsim.run import UNABLE, Run, force_to_blame
-from flocsim.state.work import NOW, motion_of
+from flocsim.state.work import work_of
 from flocsim.system import System
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def draws(seed: int, replicate: int) -> np.ndarray:
 
 def orientations(numbers: Sequence[float] | np.ndarray) -> tuple[float, float]:
     """Return angles θ = 2πn [rad] of bodies i and j."""
-    return 2.0 * np.pi * numbers[0], 2.0 * np.pi * numbers[1]
+    return 2.0 * math.pi * float(numbers[0]), 2.0 * math.pi * float(numbers[1])
 
 
 @lru_cache(maxsize=128)
@@ -175,11 +175,16 @@ class Draw:
         encounter's, of the driver's method.
         """
         encounter = self.encounter
+        motion = encounter.motion(self.angles, self.share)
+        integrator = integrator or encounter.system.integrator
+        until = min(encounter.time_limit(self.share), until)
+        if not record and (run := encounter.spare_run()) is not None:
+            given = encounter.given
+            run.restart(driver, encounter.scene, motion, integrator, until, max_steps, given)
+            return run
         return Run(
-            driver, encounter.scene, encounter.start(self.angles, self.share),
-            integrator or encounter.system.integrator,
-            min(encounter.time_limit(self.share), until), max_steps=max_steps,
-            observed=encounter.observed(), record=record,
+            driver, encounter.scene, work_of(encounter.scene, *motion), integrator, until,
+            max_steps=max_steps, observed=encounter.given.copy(), record=record,
         )  # fmt: skip
 
     def run(
@@ -194,7 +199,7 @@ class Draw:
         run = self.begin(driver, max_steps, integrator=integrator)
         status = run.to_end(halted)
         row = None if status == Status.PAUSED else self.row(run, status)
-        self.encounter.take_back(run.work)
+        self.encounter.take_back(run)
         return row
 
     def row(self, run: Run, status: Status) -> dict:
@@ -236,10 +241,13 @@ class Draw:
     def system(self) -> System:
         """Return the plain System where the replicate starts."""
         system, bodies = self.encounter.system, []
-        starts = motion_of(self.encounter.start(self.angles, self.share), NOW).tolist()
-        for body, (x, y, angle, vx, vy, spin) in zip(system.bodies, starts, strict=True):
-            place = {"position": (x, y), "angle": angle, "velocity": (vx, vy), "spin": spin}
-            bodies.append(attrs.evolve(body, **place))
+        motion = (each.tolist() for each in self.encounter.motion(self.angles, self.share))
+        for body, (x, y, angle), (*velocity, spin) in zip(system.bodies, *motion, strict=True):
+            bodies.append(
+                attrs.evolve(
+                    body, position=(x, y), angle=angle, velocity=tuple(velocity), spin=spin
+                )
+            )
         return system.changed(bodies=tuple(bodies))
 
 

@@ -33,8 +33,9 @@ from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.forces.settling import largest_mobility, terminal_motion
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.io.results.schema import SHAPE_MEASURES
+from flocsim.run import Motion, Run
 from flocsim.state.scene import Scene
-from flocsim.state.work import Work, begin_anew, fits, work_of
+from flocsim.state.work import fits
 from flocsim.system import System
 
 LIMIT_TURNS = 1000.0
@@ -128,8 +129,8 @@ class Encounter(abc.ABC):
         return self.system.laws()
 
     @functools.cached_property
-    def spare(self) -> list[Work]:
-        """Work arrays of runs that have ended, in which those to come begin."""
+    def spare(self) -> list[Run]:
+        """Runs that have ended, in whose arrays those to come begin."""
         return self.first.spare if self.first else []
 
     @functools.cached_property
@@ -164,7 +165,7 @@ class Encounter(abc.ABC):
         """k_B T of the thermal motion [J], 0 without."""
         return max((each.energy for each in thermal_forces(self.system.forces)), default=0.0)
 
-    @property
+    @functools.cached_property
     def shapes(self) -> tuple[Shape, ...]:
         return tuple(body.shape for body in self.system.bodies)
 
@@ -187,17 +188,17 @@ class Encounter(abc.ABC):
         """|drift| [m/s]."""
         return math.hypot(*self.drift)
 
-    @property
+    @functools.cached_property
     def outer(self) -> float:
         """R_i + R_j, the largest centroid-to-outline distances [m]."""
         return sum(shape.bounding_radius for shape in self.shapes)
 
-    @property
+    @functools.cached_property
     def size(self) -> float:
         """r_i + r_j [m]."""
         return sum(shape.equivalent_radius for shape in self.shapes)
 
-    @property
+    @functools.cached_property
     def mobility(self) -> float:
         """µ_i + µ_j [s/kg], by which a force between the two moves them against each other."""
         return sum(mobility for _, mobility in self.settling)
@@ -255,10 +256,6 @@ class Encounter(abc.ABC):
         """Time [s] in which what a bond must withstand has come from all directions."""
         return REST_TURNS * self.turn_time
 
-    def observed(self) -> np.ndarray:
-        """Return fresh numbers for the observer: what it is given, and room for its results."""
-        return self.given.copy()
-
     @functools.cached_property
     def given(self) -> np.ndarray:
         """What the observer of every replicate is given: columns of `outcomes`."""
@@ -298,17 +295,21 @@ class Encounter(abc.ABC):
         limit = self.options.time_limit
         return self.longest(share) if isinstance(limit, str) else limit
 
-    def start(self, angles: Sequence[float], share: float) -> Work:
-        """Return work arrays of a replicate with these angles [rad] and ``share``: see Draw."""
-        place, velocity = map(np.array, self.places(angles, share))
-        with contextlib.suppress(IndexError):  # none is left, or another thread has taken it
-            while not fits(work := self.spare.pop(), self.scene):
-                pass
-            begin_anew(work, self.scene, place, velocity)
-            return work
-        return work_of(self.scene, place, velocity)
+    def motion(self, angles: Sequence[float], share: float) -> Motion:
+        """Return positions and velocities (2, 3) at the start of a replicate: see Draw."""
+        place, velocity = self.places(angles, share)
+        return np.array(place), np.array(velocity)
 
-    def take_back(self, work: Work) -> None:
-        """Let a run to come begin in the work arrays of one that has ended."""
-        keep(work, self.first or self)
-        self.spare.append(work)
+    def spare_run(self) -> Run | None:
+        """Return a run that has ended, in whose arrays another one may begin; None if there is
+        none."""
+        with contextlib.suppress(IndexError):  # none is left, or another thread has taken it
+            while not fits((run := self.spare.pop()).work, self.scene):
+                pass
+            return run
+        return None
+
+    def take_back(self, run: Run) -> None:
+        """Let a run to come begin in the arrays of one that has ended."""
+        run.keep(self.first or self)
+        self.spare.append(run)

@@ -29,7 +29,7 @@ def half_extent(shape: Shape, angle: float, side: float) -> float:
     """Return the extent of a turned outline from its centroid [m], towards +x (``side`` 1) or −x
     (−1)."""
     across = side * math.cos(angle), -side * math.sin(angle)
-    return max(part.radius + float((part.points @ across).max()) for part in shape.parts)
+    return float(max([part.radius + (part.points @ across).max() for part in shape.parts]))
 
 
 def half_widths(shape: Shape, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -92,16 +92,17 @@ def start_height(bodies, angle_i, angle_j, contact, reach, displacement, gap):
         end_y = sj * vertices[end].x + cj * vertices[end].y
         for other in range(bodies.first[0], bodies.first[1]):
             stop = other + vertices[other].edge_offset
-            low_x = ci * vertices[other].x - si * vertices[other].y
             low_y = si * vertices[other].x + ci * vertices[other].y
-            stop_x = ci * vertices[stop].x - si * vertices[stop].y
             stop_y = si * vertices[stop].x + ci * vertices[stop].y
             wide = contact + gap + vertices[point].excess_radius + vertices[other].excess_radius
-            if max(low_y, stop_y) + wide - y > highest:
-                highest = max(highest, top_of_edge(low_x, low_y, stop_x, stop_y, wide, x) - y)
+            # Most lie too low to count.
+            if max(low_y, stop_y) + wide - min(y, end_y) <= highest:
+                continue
+            low_x = ci * vertices[other].x - si * vertices[other].y
+            stop_x = ci * vertices[stop].x - si * vertices[stop].y
+            highest = max(highest, top_of_edge(low_x, low_y, stop_x, stop_y, wide, x) - y)
             # The other's vertex under the edge: mirrored, it is above.
-            if low_y + wide - min(y, end_y) > highest:
-                highest = max(highest, low_y + top_of_edge(x, -y, end_x, -end_y, wide, low_x))
+            highest = max(highest, low_y + top_of_edge(x, -y, end_x, -end_y, wide, low_x))
     clear = reach + gap
     return highest if highest > -clear else clear
 

@@ -28,7 +28,7 @@ from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.io.results.schema import BONDS
 from flocsim.state.bodies import ANGLE
-from flocsim.state.work import NOW
+from flocsim.state.work import NOW, work_of
 from tests.helpers.small_study import small_config
 from tests.helpers.two_bodies import ANCHOR, CHANNEL, polygon
 
@@ -51,8 +51,8 @@ class Doublet:
         config = small_config(folder, overrides)
         self.encounter = make_encounter(config, self.shapes, 1e-3)
         self.scene = self.encounter.system.scene(jit=False)
-        self.work = self.encounter.start((0.0, 0.0), 0.0)
-        self.observed = self.encounter.observed()
+        self.work = work_of(self.encounter.scene, *self.encounter.motion((0.0, 0.0), 0.0))
+        self.observed = self.encounter.given.copy()
         self.observed[outcomes.COLLIDED] = 1.0
         if places is None:
             places = [(0.0, 0.0, 0.0), (0.0, 1e-9 - sum(RADII), 0.0)]

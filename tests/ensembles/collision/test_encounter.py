@@ -12,7 +12,6 @@ from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS
 from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.state.bodies import Y
-from flocsim.state.work import NOW, motion_of
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_config, small_study
 
@@ -25,7 +24,7 @@ def study(tmp_path_factory):
 
 def test_bodies_start_at_their_terminal_velocities_without_spin(study):
     encounter = study.encounter(0, 16, draws(1, 0))
-    motion = motion_of(encounter.start((0.3, 2.0), 0.5), NOW)
+    motion = np.hstack(encounter.motion((0.3, 2.0), 0.5))
     for body in range(2):
         radius = encounter.shapes[body].equivalent_radius
         mass = 2.0 * math.pi * radius**2
@@ -50,17 +49,17 @@ def test_automatic_times_are_turn_times(study):
     drift = math.hypot(*encounter.drift)
     turn = (16.41e-6 + 23.02e-6) / drift
     assert encounter.turn_time == pytest.approx(turn)
-    assert encounter.observed()[outcomes.REST_TIME] == pytest.approx(REST_TURNS * turn)
+    assert encounter.given[outcomes.REST_TIME] == pytest.approx(REST_TURNS * turn)
     assert encounter.time_limit() == pytest.approx(LIMIT_TURNS * turn + 2e-6 / drift)
 
 
 def test_times_and_gaps_that_are_given(tmp_path):
     given = {"rest_time": 0.5, "time_limit": 3.0, "escape_gap": "7 um", "start_gap": "3 um"}
     encounter = small_study(tmp_path, {"scene": given}).encounter(0, 1, draws(1, 0))
-    observed = encounter.observed()
+    observed = encounter.given.copy()
     assert encounter.time_limit() == 3.0
     assert (observed[outcomes.REST_TIME], observed[outcomes.ESCAPE]) == (0.5, 7e-6)
-    places = encounter.start((0.0, 0.0), 0.0).place[NOW, :, Y]
+    places = encounter.motion((0.0, 0.0), 0.0)[0][:, Y]
     assert places[1] - places[0] == pytest.approx(16.41e-6 + 23.02e-6 + 3e-6, rel=1e-9)
 
 

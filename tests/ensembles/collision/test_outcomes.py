@@ -29,7 +29,7 @@ from flocsim.geometry.contact.points import least_listed_gap, locate_contacts
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from flocsim.state.bodies import ANGLE, X, Y
-from flocsim.state.work import NOW
+from flocsim.state.work import NOW, work_of
 from tests.helpers.small_study import small_config, small_study
 from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
@@ -70,7 +70,8 @@ def go_on(study, condition, vertices, share, replicate, factor=11.0):
     row = study.run(condition, vertices, share, replicate)
     numbers = draws(study.config.seed, replicate)
     encounter = study.encounter(condition, vertices, numbers)
-    work, observed = encounter.start(orientations(numbers), share), encounter.observed()
+    work = work_of(encounter.scene, *encounter.motion(orientations(numbers), share))
+    observed = encounter.given.copy()
     integrator, driver = encounter.system.integrator, study.driver(encounter)
     clock, counts = integrator.fresh_clock(), integrator.fresh_counts(10**6)
     clock.until = factor * row["t_end"]
@@ -183,7 +184,8 @@ def test_bodies_of_one_size_meet_where_the_lower_one_is_held(tmp_path):
 def test_a_pair_apart_and_parting_has_departed(study):
     # The observer by itself, uncompiled: two spheres, the heavier one below and drifting on.
     encounter = study.encounter(0, 1, draws(1, 0))
-    work, observed = encounter.start((0.0, 0.0), 0.0), encounter.observed()
+    work = work_of(encounter.scene, *encounter.motion((0.0, 0.0), 0.0))
+    observed = encounter.given.copy()
     contact = sum(shape.radius for shape in encounter.shapes)
 
     def seen(gap, collided):
@@ -203,7 +205,8 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     # It is at rest within itself as it swings through its lowest point; what it will do at the
     # turning point, where the load is another, is not known yet.
     encounter = study.encounter(0, 1, draws(1, 0))
-    work, observed = encounter.start((0.0, 0.0), 0.0), encounter.observed()
+    work = work_of(encounter.scene, *encounter.motion((0.0, 0.0), 0.0))
+    observed = encounter.given.copy()
     spin, reach = 300.0, sum(shape.radius for shape in encounter.shapes) - 1e-12
     work.place[NOW] = work.velocity[NOW] = 0.0
     work.velocity[NOW, :, ANGLE] = spin
@@ -281,8 +284,8 @@ class Falling:
         self.body = body
         self.encounter = make_encounter(config, [shape, body], 1e-9)
         self.scene = self.encounter.system.scene(jit=False)
-        self.work = self.encounter.start((0.0, 0.0), 0.0)
-        self.observed = self.encounter.observed()
+        self.work = work_of(self.encounter.scene, *self.encounter.motion((0.0, 0.0), 0.0))
+        self.observed = self.encounter.given.copy()
         # Places are told as in the outline above, whose centroid is not at its origin.
         self.origin = shape.vertices[0] - outline[0]
 

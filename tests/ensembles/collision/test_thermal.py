@@ -29,7 +29,7 @@ from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.state.bodies import X
-from flocsim.state.work import NOW, motion_of
+from flocsim.state.work import NOW, work_of
 from tests.helpers.small_study import small_config
 
 ENERGY = BOLTZMANN * 298.15
@@ -52,8 +52,8 @@ class Pair:
         self.encounter = make_encounter(self.config, self.shapes, 3.5e-6, meeting=meeting)
         self.scene = self.encounter.system.scene(jit=False)
         self.encounter.__dict__["scene"] = self.scene
-        self.work = self.encounter.start((0.0, 0.0), 0.0)
-        self.observed = self.encounter.observed()
+        self.work = work_of(self.encounter.scene, *self.encounter.motion((0.0, 0.0), 0.0))
+        self.observed = self.encounter.given.copy()
         self.observed[outcomes.COLLIDED] = collided
         self.total = sum(shape.radius for shape in self.shapes)
 
@@ -153,7 +153,7 @@ def test_a_brownian_pair_has_missed_where_the_study_says_so(tmp_path):
 def test_a_brownian_pair_starts_in_any_direction(tmp_path):
     pair = Pair(tmp_path, BROWNIAN)
     for share in (0.0, 0.2, 0.7):
-        start = motion_of(pair.encounter.start((1.0, 2.0), share), NOW)
+        start = np.hstack(pair.encounter.motion((1.0, 2.0), share))
         turn = 2.0 * math.pi * share
         assert start[1, :2] == pytest.approx([6e-6 * math.cos(turn), 6e-6 * math.sin(turn)])
         assert start[:, 2].tolist() == [1.0, 2.0]
