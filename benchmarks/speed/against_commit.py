@@ -40,35 +40,21 @@ for line in sys.stdin:
 """
 """Runs groups of replicates on demand."""
 
-MADE = {
-    "settling": """\
-from flocsim.ensembles import load_config
-from flocsim.ensembles import study as room
-
-config = load_config(Path(sys.argv[1]))
-study = room.Study(config, flocs=room.flocs_of(config))
-
-
-def group_of(group):
-    return [(share, group) for share in config.scene.delta]
-""",
-    "shear": """\
+MADE = """\
 from flocsim.ensembles.config.loader import load_any_config
-try:
-    from flocsim.ensembles.kind import study_of
-except ImportError:  # in older versions
-    from flocsim.ensembles.kernels import study_of
+from flocsim.ensembles.kind import study_of
 
 config = load_any_config(Path(sys.argv[1]))
 study = study_of(config)
 
 
 def group_of(group):
+    shares = getattr(config.scene, "delta", None)
+    if shares:
+        return [(share, group) for share in shares]
     return [(1.0, 4 * group + k) for k in range(4)]
-""",
-}
-"""How the child makes its study, and what is in a group; of settling, with names that were there in
-every version."""
+"""
+"""How the child makes its study, and what is in a group, with names that the other commit has."""
 
 STUDY = {
     "settling": """\
@@ -177,7 +163,7 @@ def main():
             STUDY[meeting].format(vertices=arguments.vertices, preset=arguments.preset)
         )
         other = other_tree(arguments.commit, folder)
-        program = CHILD.format(made=MADE[meeting])
+        program = CHILD.format(made=MADE)
         there = Child(other, program, study, folder=folder, cache=folder / "cache_there")
         here = Child(ROOT, program, study, folder=folder, cache=folder / "cache_here")
         every = []

@@ -108,15 +108,32 @@ def add_segment(nodes, count, piece, inset, lens):
         nodes.attraction[k] -= found if (low < high) & (p != 0.0) else 0.0
 
 
+def gauss_order(away):
+    """Return how many nodes integrate a piece seen from ``away`` times its half-length.
+
+    The integrand is analytic within an ellipse through the point, of which the semi-axes add up to
+    e = away + √(away² − 1): n nodes err by about e^−2n, at most 1e-10 here.
+    """
+    if away > 16.0:
+        return 4
+    if away > 5.0:
+        return 6
+    return 10 if away > 2.5 else MOST_ORDER
+
+
 def arc_by_gauss(x, y, rules, piece, radius, lens):
     """Return S of an arc by Gauss's rule; x, y as seen from its centre."""
     total = 0.0
-    for k in range(MOST_ORDER):
-        node, weight = rules[MOST_ORDER, 0, k], rules[MOST_ORDER, 1, k]
+    # The circle around the piece is at least as wide as the arc is long.
+    middle_x, middle_y = piece.middle_x - piece.x, piece.middle_y - piece.y
+    away = math.sqrt((x - middle_x) * (x - middle_x) + (y - middle_y) * (y - middle_y))
+    order = gauss_order((away - piece.arc_radius + radius) / piece.extent)
+    for k in range(order):
+        node, weight = rules[order, 0, k], rules[order, 1, k]
         # The arc is parametrised by t = tan(φ/2) from its middle.
         t = piece.half * node
-        denominator = 1.0 + t * t
-        c, s = (1.0 - t * t) / denominator, 2.0 * t / denominator
+        inverse = 1.0 / (1.0 + t * t)
+        c, s = (1.0 - t * t) * inverse, 2.0 * t * inverse
         nx, ny = (
             c * piece.direction_x - s * piece.direction_y,
             c * piece.direction_y + s * piece.direction_x,
@@ -125,7 +142,7 @@ def arc_by_gauss(x, y, rules, piece, radius, lens):
         squared = dx * dx + dy * dy
         if squared < lens * lens:
             ahead = nx * dx + ny * dy
-            total += weight * ahead / (denominator * squared * squared * math.sqrt(squared))
+            total += weight * ahead * inverse / (squared * squared * math.sqrt(squared))
     return 2.0 * radius * piece.half * total
 
 

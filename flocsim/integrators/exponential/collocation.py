@@ -236,7 +236,9 @@ def solve_series(scene, work, clock, step, known):
         rate = predicted if before == math.inf else change / before
         if not (change < math.inf and rate < 1.0):
             break
-        terms = expand(work, clock, step, allowed)
+        # In free motion the correction is rounding: the series stays as it is.
+        if change > TERM_TOLERANCE * ITERATION_TOLERANCE * allowed:
+            terms = expand(work, clock, step, allowed)
         if terms > 0 and change * rate <= goal * (1.0 - rate):
             finish_step(scene, work, terms, step)
             clock.stages_step, clock.stages_time = step, clock.time
