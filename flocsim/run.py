@@ -121,7 +121,9 @@ class Run:
             self.fresh = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
         self.driver, self.scene = driver, scene
         begin_anew(self.work, scene, *motion)
-        self.clock.base[0], self.counts.base[0] = self.fresh
+        clock, counts = self.fresh
+        self.clock.become(clock)
+        self.counts.become(counts)
         self.clock.until, self.counts.max_steps = until, max_steps
         self.observed[:] = observed
         self.saved = [self.row_now()]
