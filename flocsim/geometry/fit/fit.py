@@ -104,7 +104,8 @@ def fit_mask(
     mask: (h, w) bool or 0/1, one 8-connected region; vertices: N ≥ 1; radius: spheroradius [px].
     method: "pattern" starts from the best N of points along the outline, moves all vertices at
     once while V falls, anneals them, and moves one after the other by shrinking steps
-    (1 … 0.25 px) while V falls; "paper" lets the vertices move as damped
+    (1 … 0.25 px) while V falls; more vertices than an outline has room for, one in some 2 px, lie
+    on edges of the fit of fewer; "paper" lets the vertices move as damped
     particles down the gradient of V (paper, section 2.3), from even spacing; "even" spaces N points
     evenly on the outline, drawn in by the radius, and leaves them there (the plain baseline).
     preserve_area: the swept area is exactly the mask's; "pattern" then also minimises the

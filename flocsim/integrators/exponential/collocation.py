@@ -48,8 +48,10 @@ from flocsim.state.work import (
     DAMPING,
     FIRST_STAGE,
     FORCING,
+    LEVER,
     MOST_IN_SERIES,
     MOTION,
+    MOVED,
     NOW,
     PROPAGATED,
     START,
@@ -236,9 +238,7 @@ def solve_series(scene, work, clock, step, known):
         rate = predicted if before == math.inf else change / before
         if not (change < math.inf and rate < 1.0):
             break
-        # In free motion the correction is rounding: the series stays as it is.
-        if change > TERM_TOLERANCE * ITERATION_TOLERANCE * allowed:
-            terms = expand(work, clock, step, allowed)
+        terms = expand(work, clock, step, allowed)
         if terms > 0 and change * rate <= goal * (1.0 - rate):
             finish_step(scene, work, terms, step)
             clock.stages_step, clock.stages_time = step, clock.time
@@ -312,6 +312,18 @@ def error_ratios_along_path(work, fraction):
     return start * fraction / along, end * fraction / along
 
 
+def remainder_displaces(work, goal):
+    """Return True if R displaces any outline by more than ``goal`` [m] in the step."""
+    remainder, weights = work.remainder, work.weights
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            size = abs(remainder[MOTION, 1, body, axis]) + abs(remainder[MOTION, 2, body, axis])
+            size += abs(remainder[MOTION, 3, body, axis])
+            if size * weights[MOVED, body, axis] * weights[LEVER, body, axis] > goal:
+                return True
+    return False
+
+
 def write_error_terms(work, step, start, end):
     """Write the first terms of the propagated error, and its source terms.
 
@@ -349,7 +361,7 @@ def propagate_with_series(work, clock, step, fraction):
         write_error_terms(work, step, start, start + (end - start) / fraction)
         terms, _, _, _ = write_terms(work, CHANGED, 0, step, goal)
         evaluate_all(work, CHANGED, PROPAGATED, terms, step, fraction, CHANGE)
-        if not nothing_swings(clock):
+        if not nothing_swings(clock) or not remainder_displaces(work, goal):
             return
         start, end = error_ratios_along_path(work, fraction)
         if start == 0.0 and end == 0.0:
