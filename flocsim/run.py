@@ -135,10 +135,7 @@ class Run:
 
     def row_now(self) -> np.ndarray:
         """Return the present time and state as one row of a record."""
-        row = np.empty((1, 1 + 6 * len(self.scene.bodies)))
-        row[0, 0], states = self.clock.time, row[0, 1:].reshape(-1, 6)
-        states[:, :3], states[:, 3:] = self.work.place[NOW], self.work.velocity[NOW]
-        return row
+        return np.append(self.clock.time, motion_of(self.work, NOW))[None]
 
     def advance(self, steps: int | None = None) -> Status:
         """Advance by so many steps; return PAUSED, or the Status with which the run has ended for

@@ -89,16 +89,11 @@ class Lanes(NamedTuple):
     who: Annotated[np.ndarray, ("lanes",), np.int64]  # index of the pair; −1: idle
 
 
-LAWS = ("reach", "spring", "dashpot", "size", "least", "repulsion", "debye", "attraction")
-
-
-@loops_apart
 def place(x, y, core_x, core_y, trial, first):
     """Write where the vertices of a body are at a stage."""
-    for k in range(x.shape[0]):
-        for m in range(x.shape[1]):
-            # sin and cos by half the angle's tangent would do; here they are exact.
-            c, s = math.cos(trial[first + 2, m]), math.sin(trial[first + 2, m])
+    for m in range(x.shape[1]):
+        c, s = math.cos(trial[first + 2, m]), math.sin(trial[first + 2, m])
+        for k in range(x.shape[0]):
             x[k, m] = trial[first, m] + c * core_x[k, m] - s * core_y[k, m]
             y[k, m] = trial[first + 1, m] + s * core_x[k, m] + c * core_y[k, m]
 
@@ -208,7 +203,7 @@ def step_ratio(lanes, errors, lifetime, tolerance, m):
         off = 0.0
         for k in range(7):
             off += errors[k] * lanes.rates[k, row, m]
-        # An angle moves the rim; an error of the velocity lasts as long as that.
+        # An error of the angle displaces the rim, one of a velocity for as long as it persists.
         weight = lanes.size[m] if row % 3 == 2 else 1.0
         weight *= lifetime if row % 6 > 2 else 1.0
         worst = max(worst, abs(lanes.step[m] * off * weight))
@@ -282,7 +277,7 @@ def pairs_of(vertices, count):
         i, j = system.bodies
         reduced = 1.0 / (1.0 / i.shape.equivalent_radius + 1.0 / j.shape.equivalent_radius)
         together = i.mass * j.mass / (i.mass + j.mass)
-        # In the order of LAWS.
+        # As take() reads them: from the sum of the spheroradii to the attraction.
         laws.append([
             i.shape.radius + j.shape.radius, contact.k_n, 2.0 * math.sqrt(contact.k_n * together),
             i.shape.equivalent_radius + j.shape.equivalent_radius, attraction.d_min,

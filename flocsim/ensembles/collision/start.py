@@ -54,7 +54,7 @@ def largest_displacement(
 
 
 def top_of_edge(ax, ay, bx, by, radius, x):
-    """Return the height [m] at which a disk of a radius around the edge from a to b ends above x,
+    """Return the height [m] of the top, at x, of the edge from a to b swept by a disk of a radius;
     −inf beside it."""
     if x < min(ax, bx) - radius or x > max(ax, bx) + radius:
         return -math.inf
@@ -92,17 +92,17 @@ def start_height(bodies, angle_i, angle_j, contact, reach, displacement, gap):
         end_y = sj * vertices[end].x + cj * vertices[end].y
         for other in range(bodies.first[0], bodies.first[1]):
             stop = other + vertices[other].edge_offset
-            low_y = si * vertices[other].x + ci * vertices[other].y
+            other_y = si * vertices[other].x + ci * vertices[other].y
             stop_y = si * vertices[stop].x + ci * vertices[stop].y
             wide = contact + gap + vertices[point].excess_radius + vertices[other].excess_radius
             # Most lie too low to count.
-            if max(low_y, stop_y) + wide - min(y, end_y) <= highest:
+            if max(other_y, stop_y) + wide - min(y, end_y) <= highest:
                 continue
-            low_x = ci * vertices[other].x - si * vertices[other].y
+            other_x = ci * vertices[other].x - si * vertices[other].y
             stop_x = ci * vertices[stop].x - si * vertices[stop].y
-            highest = max(highest, top_of_edge(low_x, low_y, stop_x, stop_y, wide, x) - y)
+            highest = max(highest, top_of_edge(other_x, other_y, stop_x, stop_y, wide, x) - y)
             # The other's vertex under the edge: mirrored, it is above.
-            highest = max(highest, low_y + top_of_edge(x, -y, end_x, -end_y, wide, low_x))
+            highest = max(highest, other_y + top_of_edge(x, -y, end_x, -end_y, wide, other_x))
     clear = reach + gap
     return highest if highest > -clear else clear
 

@@ -5,8 +5,9 @@
    global_search.py, as are the best N points.
 3. The best of all these, by the pixels counted, is searched vertex by vertex.
 
-The starts are among those, so that V never ends above that of even spacing. Where N vertices would
-be crowded, fewer are searched, and the longest edges of their outline are halved.
+The starts are among those, so that V never ends above that of even spacing of as many vertices as
+are searched. Where N vertices would be crowded these are fewer, and the longest edges of their
+outline are halved.
 
 A search lowers V + balance·|excess| + outside·(V + excess): V the wrong pixels, excess those
 covered less those of the mask, so that V + excess is twice the pixels covered outside of the mask.

@@ -53,10 +53,12 @@ def is_force_felt(scene, work, clock, step, row):
     KINK_EFFECT of the tolerance, at once or later."""
     largest = 0.0
     for state in (NOW, NEW):
-        normal, tangential = contact_force(scene, contact_view(scene, work, state, row))
+        view = contact_view(scene, work, state, row)
+        normal, tangential = contact_force(scene, view)
         largest = max(largest, abs(normal), abs(tangential))
-    mass = contact_view(scene, work, NOW, row).effective_mass
-    displacement = largest * step / mass * (step + velocity_lifetime_of(work, row))
+    # It displaces them by F h²/m in the step, and by F h/m · lifetime behind it.
+    speed = largest * step / view.effective_mass
+    displacement = speed * (step + velocity_lifetime_of(work, row))
     return displacement > KINK_EFFECT * clock.tolerance
 
 

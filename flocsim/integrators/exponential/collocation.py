@@ -361,6 +361,7 @@ def propagate_with_series(work, clock, step, fraction):
         write_error_terms(work, step, start, start + (end - start) / fraction)
         terms, _, _, _ = write_terms(work, CHANGED, 0, step, goal)
         evaluate_all(work, CHANGED, PROPAGATED, terms, step, fraction, CHANGE)
+        # What displaces nothing does not change an error either, as in free motion.
         if not nothing_swings(clock) or not remainder_displaces(work, goal):
             return
         start, end = error_ratios_along_path(work, fraction)
