@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.compiler.by_pointer import keep
 from flocsim.compiler.composer import compose
 from flocsim.compiler.linker import where
 from flocsim.forces.check import describe_sample
@@ -29,7 +28,6 @@ from flocsim.state.scene import Scene
 from flocsim.state.work import (
     NOW,
     Work,
-    begin_anew,
     copy_of,
     counts_as_pair,
     motion_of,
@@ -100,38 +98,12 @@ class Run:
     ) -> None:
         self.driver, self.scene, self.work, self.integrator = driver, scene, work, integrator
         self.clock, self.counts = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
-        self.fresh = self.clock.copy(), self.counts.copy()
         self.clock.until = until
         self.observed = np.zeros(1) if observed is None else observed
         n = len(scene.bodies)
         # Of fixed size for the compiled loop, which returns when it is full; empty: none is kept.
         self.record = np.zeros((STEPS_AT_A_TIME if record else 0, 1 + 6 * n))
         self.saved = [self.row_now()]
-
-    def restart(
-        self, driver: Callable[..., int], scene: Scene, motion: Motion, integrator: Integrator,
-        until: float, max_steps: int, observed: np.ndarray,
-    ) -> None:  # fmt: skip
-        """Begin another run of as many bodies in the same arrays, which costs less than new ones.
-
-        ``motion``: positions and velocities at the start, (n, 3) each. Others: as in Run.
-        """
-        if integrator is not self.integrator:
-            self.integrator = integrator
-            self.fresh = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
-        self.driver, self.scene = driver, scene
-        begin_anew(self.work, scene, *motion)
-        clock, counts = self.fresh
-        self.clock.become(clock)
-        self.counts.become(counts)
-        self.clock.until, self.counts.max_steps = until, max_steps
-        self.observed[:] = observed
-        self.saved = [self.row_now()]
-
-    def keep(self, owner: Any) -> None:
-        """Have calls of the driver remember where the arrays are, as long as ``owner`` lives."""
-        for each in (self.work, self.observed, self.clock, self.counts, self.record):
-            keep(each, owner)
 
     def row_now(self) -> np.ndarray:
         """Return the present time and state as one row of a record."""
@@ -226,18 +198,26 @@ class Run:
     @property
     def error(self) -> float:
         """Stated error of the motion [m]; inf where nothing is known of it (see known_error)."""
-        stated, sizes = float(self.clock.error), self.scene.bodies["bounding_radius"]
-        # Below the size of a body it is known.
-        if stated <= sizes.max():
-            return stated
         start, now = self.saved[0][0], self.row_now()[0]
-        velocity = np.stack([row[1:].reshape(-1, 6)[:, 3:] for row in (start, now)])
-        return float(known_error(np.array(stated), velocity, sizes, now[0] - start[0]))
+        first, last = (row[1:].reshape(-1, 6)[:, 3:] for row in (start, now))
+        sizes = self.scene.bodies["bounding_radius"]
+        return stated_error(float(self.clock.error), first, last, sizes, now[0] - start[0])
 
     @property
     def code(self) -> int:
         """Last code of the observer."""
         return int(self.counts.code)
+
+
+def stated_error(
+    stated: float, first: np.ndarray, last: np.ndarray, sizes: np.ndarray, elapsed: float
+) -> float:
+    """Return the stated error of a run [m] by its velocities at the start and at the end; see
+    known_error."""
+    # Below the size of a body it is known.
+    if stated <= sizes.max():
+        return float(stated)
+    return float(known_error(np.array(stated), np.stack([first, last]), sizes, elapsed))
 
 
 def known_error(
@@ -340,17 +320,17 @@ def invalid_value(force: Any, pieces: Pieces, views: Iterable, fluid: Any) -> st
 
 
 @np.errstate(all="ignore")
-def force_to_blame(system: Any, run: Run) -> str:
-    """Return the force of a System that gives NaN, or more than LARGEST, where a Run has ended, in
-    words; "" if none does."""
+def force_to_blame(system: Any, arrays: Work, time: float) -> str:
+    """Return the force of a System that gives NaN, or more than LARGEST, where a run has ended, at
+    a time [s], in words; "" if none does."""
     # Plain functions, as each force is evaluated by itself: compiled laws are sums of forces.
     scene: Any = system.scene(jit=False)
-    start = motion_of(run.work, NOW)
+    start = motion_of(arrays, NOW)
     # A state that is not finite says nothing about its cause.
     if not np.isfinite(start).all():
         return ""
     # With more room: wider lists than the run had must not run out of it.
-    work = with_room(run.work)
+    work = with_room(arrays)
     used = system.pieces.used
     pieces = [(name, force, laws_of([force], system.fluid)) for name, force in used.items()]
     classes = [type(force) for force in used.values()]
@@ -359,7 +339,7 @@ def force_to_blame(system: Any, run: Run) -> str:
     for ahead in LOOK_AHEAD_TIMES:
         put_motion(work, NOW, start)
         work.place[NOW] += ahead * work.velocity[NOW]
-        views = views_of(system, scene, work, run.clock.time + ahead, located)
+        views = views_of(system, scene, work, time + ahead, located)
         for name, force, own in pieces:
             words = invalid_value(force, own, views.get(force.acts_on, ()), system.fluid)
             if words:

@@ -354,7 +354,7 @@ class System:
         run = fresh(record=record)
         # The run itself; a force that returned no number is identified afterwards.
         status = watched(run, watch)
-        if status in UNABLE and (why := force_to_blame(self, run)):
+        if status in UNABLE and (why := force_to_blame(self, run.work, run.clock.time)):
             warnings.warn(f"the run ended at t = {run.time:.6g} s ({status.name}): {why}",
                           KernelWarning, stacklevel=2)  # fmt: skip
         measure = None

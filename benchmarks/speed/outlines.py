@@ -83,10 +83,9 @@ def run_all(study, replicates):
     """(CPU seconds, steps) of all its replicates."""
     spent, steps = 0.0, 0
     for condition, replicate in product(range(3), range(replicates)):
-        draw = study.draw(condition, 16, 0.5, replicate)
-        driver, _ = study.driver(draw.encounter), draw.encounter.scene
+        _ = study.draw(condition, 16, 0.5, replicate).encounter.scene
         began = time.process_time()
-        row = draw.run(driver, study.config.integrator.max_steps)
+        row = study.run(condition, 16, 0.5, replicate)
         spent += time.process_time() - began
         steps += row["steps"]
     return spent, steps

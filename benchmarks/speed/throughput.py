@@ -40,11 +40,9 @@ def blank_runs(shape):
 def run_replicate(study, condition, vertices, share, replicate):
     """(row, CPU time of the run, CPU time of making its encounter)."""
     began = time.process_time()
-    draw = study.draw(condition, vertices, share, replicate)
-    driver = study.driver(draw.encounter)
+    _ = study.draw(condition, vertices, share, replicate).encounter.scene
     made = time.process_time()
-    budget = study.config.integrator.max_steps
-    row = draw.run(driver, budget)
+    row = study.run(condition, vertices, share, replicate)
     return row, time.process_time() - made, made - began
 
 

@@ -29,6 +29,13 @@ class Kept(NamedTuple):
     kinds: int  # place of its types in KINDS: comparing these would take longer than all else
 
 
+class Stacked(NamedTuple):
+    """Tables of one type, one after another, of which compiled code takes any by its number."""
+
+    words: np.ndarray  # (tables, words) of int64
+    one: Any  # an argument that has such a table
+
+
 KEPT: dict[int, Kept] = {}
 """{id of an argument: what is remembered of it}."""
 
@@ -81,7 +88,11 @@ def letter_of(value: Any) -> str:
 
 def flatten(value, words, kinds):
     """Append an argument to the words of a table, and its type to ``kinds``."""
-    if isinstance(value, np.ndarray):
+    if isinstance(value, Stacked):
+        flatten(value.words, words, kinds)
+        words.pop()  # the tables alone are counted, as their length is known
+        kinds.extend(flat(value.one)[1])
+    elif isinstance(value, np.ndarray):
         # Sizes are words and not part of the type: arrays of any size share machine code.
         words.append(address_of(value))
         words.extend(value.shape)
@@ -115,6 +126,14 @@ def packed(words: list[Any]) -> bytes:
     return struct.pack("@" + "".join(letters), *words)
 
 
+def table_and_kinds(value: Any) -> tuple[bytes, Any]:
+    """Return an argument's part of a table, and what tells its types."""
+    if (kept := KEPT.get(id(value))) is not None:
+        return kept.table, kept.kinds
+    words, kinds = flat(value)
+    return packed(words), kinds
+
+
 def table_of(arguments: tuple[Any, ...]) -> tuple[bytes, tuple[Any, ...]]:
     """Return the arguments as a table, and what tells their types: of each those of `flat`, or
     their place in KINDS."""
@@ -124,12 +143,9 @@ def table_of(arguments: tuple[Any, ...]) -> tuple[bytes, tuple[Any, ...]]:
         if type(each) is float:
             parts.append(DOUBLE.pack(each))
             kinds.append(("d",))
-        elif (kept := KEPT.get(id(each))) is not None:
-            parts.append(kept.table)
-            kinds.append(kept.kinds)
         else:
-            words, own = flat(each)
-            parts.append(packed(words))
+            part, own = table_and_kinds(each)
+            parts.append(part)
             kinds.append(own)
     return b"".join(parts), tuple(kinds)
 

@@ -33,7 +33,7 @@ from numba.extending import (
     type_callable,
 )
 
-from flocsim.compiler.by_pointer import letter_of, sizes_of
+from flocsim.compiler.by_pointer import Stacked, letter_of, sizes_of
 from flocsim.errors import KernelError
 
 WORD = ir.IntType(64)
@@ -76,7 +76,7 @@ class Row(Addressed):
 
 
 class Elements(Addressed):
-    """An array; ``sizes`` that never change, 0 for others."""
+    """An array of numbers, records or tables; ``sizes`` that never change, 0 for others."""
 
     def __init__(self, dtype, sizes):
         self.dtype, self.sizes, self.ndim = dtype, sizes, len(sizes)
@@ -114,6 +114,8 @@ def type_of(value: Any, sizes: tuple[int, ...] = ()) -> Any:
     """Return the numba type of an argument; ``sizes``: those that an array always has."""
     if isinstance(value, np.void):
         return Row(value.dtype)
+    if isinstance(value, Stacked):
+        return Elements(type_of(value.one), (0,))
     if isinstance(value, np.ndarray):
         dtype = Row(value.dtype) if value.dtype.names else from_dtype(value.dtype)
         return Elements(dtype, sizes or (0,) * value.ndim)
@@ -209,10 +211,13 @@ def place_of_element(context, builder, kind, value, index, given):
             offset = builder.mul(offset, size(builder, kind, value, axis), flags=["nsw"])
             number = builder.add(offset, number, flags=["nsw"])
         offset = number
-    # Records are addressed in words: each of their fields is one word long.
-    if isinstance(kind.dtype, Row):
-        offset = builder.mul(offset, WORD(kind.dtype.size // 8), flags=["nsw"])
-    element = WORD if isinstance(kind.dtype, Row) else context.get_data_type(kind.dtype)
+    # Records and tables are addressed in words: each field of a record is one word long.
+    element = WORD
+    if isinstance(kind.dtype, Row | Table):
+        words = kind.dtype.size // 8 if isinstance(kind.dtype, Row) else kind.dtype.words
+        offset = builder.mul(offset, WORD(words), flags=["nsw"])
+    else:
+        element = context.get_data_type(kind.dtype)
     data = builder.inttoptr(read_word(builder, value, 0), element.as_pointer())
     return builder.gep(data, [offset], inbounds=True)
 
@@ -279,10 +284,12 @@ def type_setitem(context):
 
 @lower_builtin(operator.getitem, Elements, types.Any)
 def getitem(context, builder, sig, args):
-    """Read an element; a record is read where its fields are."""
+    """Read an element; a record or a table is read where its fields are."""
     kind = sig.return_type
     place = place_of_element(context, builder, sig.args[0], args[0], sig.args[1], args[1])
-    return place if isinstance(kind, Row) else load(context, builder, kind, place, str(kind))
+    if isinstance(kind, Row | Table):
+        return place
+    return load(context, builder, kind, place, str(kind))
 
 
 @lower_builtin(operator.setitem, Elements, types.Any, types.Any)

@@ -161,6 +161,16 @@ class StudyKind:
         """
         raise NotImplementedError
 
+    def run_some(
+        self, condition: Condition, first: int, stop: int, halted: Callable[[], bool],
+        left: Any = None, keep: Keep | None = None, going: Going | None = None,
+    ) -> tuple[np.ndarray, list[dict]]:  # fmt: skip
+        """Run replicates from ``first`` on, before ``stop``: one, unless a kind runs several at a
+        time. Return their rows, none where halted, and notes on those that have failed."""
+        row, note = self.run_task(condition, first, halted, left, keep, going)
+        rows = [] if row is None else [tuple(row[name] for name in self.row.names or ())]
+        return np.array(rows, self.row), [note] if note else []
+
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
         """Return flags of the rows of failed replicates; ``column(name)`` gives their values."""
         raise NotImplementedError

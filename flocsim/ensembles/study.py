@@ -5,6 +5,7 @@ replicates are points of a scrambled Sobol sequence.
 """
 
 import hashlib
+import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any, ClassVar
@@ -14,17 +15,14 @@ import numpy as np
 
 from flocsim.compiler.composer import is_on_disk
 from flocsim.compiler.fingerprint import fingerprint
+from flocsim.ensembles.collision.batch import Batches, GivenUp, Whys
 from flocsim.ensembles.collision.draw import (
-    BLANK,
-    CHECKED,
     FAILED,
     FAILURES,
     LONGEST_REASON,
     MORE_STEPS,
     NO_FLOC,
     SAMPLE,
-    THIRD,
-    WHY,
     Draw,
     as_draws,
     columns_of,
@@ -46,21 +44,21 @@ from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING, PairScene
 from flocsim.ensembles.config.schema import BAND, CUT, Config
 from flocsim.ensembles.diagnose.preflight import check_study, study_warnings
-from flocsim.ensembles.kind import Code, Condition, Going, Keep, StudyKind
+from flocsim.ensembles.kind import COLUMNS, Code, Condition, Going, Keep, StudyKind
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance
 from flocsim.io.results.events import flips_easily
-from flocsim.io.results.schema import BAND_ENDS, NOT_APPLICABLE, OUTCOMES, RADII, UNKNOWN
+from flocsim.io.results.schema import BAND_ENDS, FURTHER_RUNS, OUTCOMES, RADII, UNKNOWN
 
 TRIED_AGAIN = ("step budget", "stalled", "too deep", "not finite")
 """Failures behind which more steps, or shorter ones, may come to an outcome."""
 
 
-WITHOUT_OUTCOME = dict.fromkeys(CHECKED.values(), NOT_APPLICABLE) | {"outcome": FAILED}
-"""What a further run has come to that met an exception."""
+BATCH_SECONDS, MOST_AT_A_TIME = 0.05, 256
+"""Time for which replicates run before their rows are handed in, and most of them."""
 
 
-def says_outcome(row: dict) -> bool:
+def says_outcome(row: Any) -> bool:
     """Whether a row says what became of a pair."""
     return OUTCOMES[row["outcome"]] not in UNKNOWN
 
@@ -86,6 +84,8 @@ class Study(StudyKind):
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
     first: dict[str, Encounter] = attrs.field(init=False, factory=dict)
     drivers: dict[tuple, Callable] = attrs.field(init=False, factory=dict)
+    batches: Batches = attrs.field(init=False, factory=Batches)
+    at_a_time: int = attrs.field(init=False, default=4)
     exact: tuple[Integrator, Integrator] | None = attrs.field(init=False)
 
     def __attrs_post_init__(self):
@@ -246,45 +246,67 @@ class Study(StudyKind):
 
     def run(
         self, condition: int, vertices: int, share: float, replicate: int,
-        halted: Callable[[], bool] | None = None,
+        halted: Callable[[], bool] = lambda: False,
     ) -> dict | None:  # fmt: skip
         """Run one replicate, as in `draw`, and those of its further runs that are due.
 
         Return its row; None where ``halted()``, looked at now and then, gives it up.
         """
-        draw = self.draw(condition, vertices, share, replicate)
-        steps = self.config.integrator.max_steps
-        row = draw.run(self.driver(draw.encounter), steps, halted)
-        if row is not None and (attempt := self.second_attempt(row)):
-            second = self.run_carefully(lambda: draw, attempt, halted, row)
-            row = second if second is None or says_outcome(second) else row
-        if row is None:
+        try:
+            rows, whys = self.run_all((condition, vertices, share), [replicate], halted)
+        except GivenUp:
             return None
-        further: list[tuple[dict[str, str], Callable[[], Draw], int, Integrator | None]] = []
-        if self.is_banded:
-            further += [
-                (columns_of(end), partial(self.draw, condition, vertices, share, replicate, end),
-                 MORE_STEPS * steps, None) for end in BAND_ENDS
-            ]  # fmt: skip
-        if self.exact is not None:
-            easily = bool(flips_easily(row["outcome"], row["bond"]))
-            wanted = self.config.integrator.check_share
-            count = further_runs(self.config.seed, replicate, wanted, easily)
-            for method, columns in list(zip(self.exact, (CHECKED, THIRD), strict=True))[:count]:
-                steps *= MORE_STEPS
-                further.append((columns, lambda: draw, steps, method))
-        has_outline = vertices > 1 or self.floc_pool.own_size
-        first = row
-        for columns, made, most, again in further:
-            found: dict | None = first  # of a sphere of a given size, which has no outline to cut
-            if has_outline or again is not None:
-                found = self.run_carefully(made, (most, again), halted, WITHOUT_OUTCOME)
-            if found is None:
-                return None
-            row = row | {column: found[name] for column, name in columns.items()}
-        return row
+        if isinstance(why := whys.get(0), Exception):
+            raise why
+        return dict(zip(COLUMNS, rows[0].tolist(), strict=True))
 
-    def second_attempt(self, row: dict) -> tuple[int, Integrator | None] | None:
+    def run_all(
+        self, place: tuple[int, int, float], replicates: Sequence[int],
+        halted: Callable[[], bool] = lambda: False,
+    ) -> tuple[np.ndarray, Whys]:  # fmt: skip
+        """Run replicates of a condition and those of their further runs that are due; return their
+        rows and why some have failed, by their places. GivenUp where ``halted()`` says so."""
+        steps, usual = self.config.integrator.max_steps, self.config.integrator.method
+
+        def run(places: Iterable[int], most: int, method: Integrator, end: str = CUT) -> Any:
+            draws = [partial(self.draw, *place, replicates[each], end) for each in places]
+            return self.batches.run(draws, most, method, halted)
+
+        rows, whys = run(range(len(replicates)), steps, usual)
+        # Those without an outcome, once more.
+        attempts = [self.second_attempt(row) for row in rows]
+        for attempt in filter(None, set(attempts)):
+            again = [k for k, each in enumerate(attempts) if each == attempt]
+            for k, row in zip(again, run(again, *attempt)[0], strict=True):
+                if says_outcome(row):
+                    rows[k] = row
+                    whys.pop(k, None)
+
+        def note(name: str, places: list[int], *how: Any) -> None:
+            """Run some as ``how`` says, and write what comes of it into columns of that name."""
+            # Spheres of a given size have no outline to cut.
+            same = name in BAND_ENDS and place[1] == 1 and not self.floc_pool.own_size
+            found = rows[places] if same else run(places, *how)[0]
+            for column, of in columns_of(name).items():
+                rows[column][places] = found[of]
+
+        whole = [k for k in range(len(rows)) if not isinstance(whys.get(k), Exception)]
+        for end in BAND_ENDS if self.is_banded else ():
+            note(end, whole, MORE_STEPS * steps, usual, end)
+        if self.exact is not None:
+            wanted = {k: self.further_runs(replicates[k], rows[k]) for k in whole}
+            for turn, (method, name) in enumerate(zip(self.exact, FURTHER_RUNS[:2], strict=True)):
+                steps *= MORE_STEPS
+                note(name, [k for k in whole if wanted[k] > turn], steps, method)
+        return rows, whys
+
+    def further_runs(self, replicate: int, row: np.void) -> int:
+        """Return how often a replicate with such a row is run again, more exactly."""
+        easily = bool(flips_easily(row["outcome"], row["bond"]))
+        wanted = self.config.integrator.check_share
+        return further_runs(self.config.seed, replicate, wanted, easily)
+
+    def second_attempt(self, row: Any) -> tuple[int, Integrator] | None:
         """(steps, method) by which a replicate is tried again whose row says nothing of its
         outcome; None where it is not.
 
@@ -293,23 +315,8 @@ class Study(StudyKind):
         ran_out = FAILURES[row["failure"]] == "step budget"
         if FAILURES[row["failure"]] not in TRIED_AGAIN or (self.exact is None and not ran_out):
             return None
-        method = None if ran_out or self.exact is None else self.exact[0]
+        method = self.config.integrator.method if ran_out or self.exact is None else self.exact[0]
         return MORE_STEPS * self.config.integrator.max_steps, method
-
-    def run_carefully(
-        self, made: Callable[[], Draw], attempt: tuple[int, Integrator | None],
-        halted: Callable[[], bool] | None, otherwise: dict,
-    ) -> dict | None:  # fmt: skip
-        """The row of the Draw that is made, run in so many steps by a method; ``otherwise`` for an
-        exception, which costs no more than this run, None where it was given up."""
-        steps, method = attempt
-        try:
-            draw = made()
-            return draw.run(self.driver(draw.encounter), steps, halted=halted, integrator=method)
-        except MemoryError:
-            raise
-        except Exception:
-            return otherwise
 
     @property
     def kinds(self) -> list[Code]:
@@ -322,36 +329,50 @@ class Study(StudyKind):
         delta = self.config.scene.delta[0]
         return [
             kind for kind in kinds
-            if not is_on_disk(self.driver(self.draw(*kind, delta, 0).encounter))
+            if not is_on_disk(self.batches.driver(
+                self.draw(*kind, delta, 0).encounter, self.config.integrator.method))
         ]  # fmt: skip
+
+    def run_some(
+        self, condition: Condition, first: int, stop: int, halted: Callable[[], bool],
+        left: Any = None, keep: Keep | None = None, going: Going | None = None,
+    ) -> tuple[np.ndarray, list[dict]]:  # fmt: skip
+        """Run as many replicates as take some BATCH_SECONDS. An exception costs one alone: its row
+        says that it has failed, and a note what is needed to run it again.
+
+        Running out of memory is nobody's fault but the machine's, and ends the study.
+        """
+        name, vertices, share = condition
+        place = [each.name for each in self.pairings].index(name), vertices, share
+        replicates = range(first, min(first + self.at_a_time, stop))
+        began = time.monotonic()
+        if (found := self.run_all(place, replicates, halted)) is None:
+            return np.zeros(0, self.row), []
+        lasted = max(time.monotonic() - began, 1e-9) / len(replicates)
+        self.at_a_time = max(
+            1, min(int(BATCH_SECONDS / lasted), 2 * len(replicates), MOST_AT_A_TIME)
+        )
+        rows, whys = found
+        notes = []
+        for number in np.flatnonzero(self.has_failed(rows.__getitem__)).tolist():
+            why, reason = whys.get(number, ""), FAILURES[rows["failure"][number]]
+            if isinstance(why, Exception):
+                drawn = orientations(self.numbers(replicates[number]))
+                rows["angle_i"][number], rows["angle_j"][number] = drawn
+                text = f"{type(why).__name__}: {' '.join(str(why).split())}"[:LONGEST_REASON]
+            else:
+                text = reason + (f": {why}" if why else "")
+            notes.append(self.note(condition, replicates[number], text))
+        return rows, notes
 
     def run_task(
         self, condition: Condition, replicate: int, halted: Callable[[], bool], left: Any = None,
         keep: Keep | None = None, going: Going | None = None,
     ) -> tuple[dict | None, dict | None]:  # fmt: skip
-        """Run one replicate. An exception costs that one alone: its row says that it has failed,
-        and a note what is needed to run it again.
-
-        Running out of memory is nobody's fault but the machine's, and ends the study.
-        """
-        name, vertices, share = condition
-        try:
-            place = [each.name for each in self.pairings].index(name)
-            row = self.run(place, vertices, share, replicate, halted)
-        except MemoryError:
-            raise
-        except Exception as error:
-            row = dict(BLANK, outcome=FAILED, failure=FAILURES.index("exception"))
-            row["angle_i"], row["angle_j"] = orientations(self.numbers(replicate))
-            why = f"{type(error).__name__}: {' '.join(str(error).split())}"[:LONGEST_REASON]
-            return row, self.note(condition, replicate, why)
-        if row is None:
-            return None, None
-        why = row.pop(WHY, "")
-        if row["outcome"] != FAILED:
-            return row, None
-        reason = FAILURES[row["failure"]] + (f": {why}" if why else "")
-        return row, self.note(condition, replicate, reason)
+        """Run one replicate."""
+        rows, notes = self.run_some(condition, replicate, replicate + 1, halted)
+        row = dict(zip(COLUMNS, rows[0].tolist(), strict=True)) if len(rows) else None
+        return row, next(iter(notes), None)
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
         """Return flags of the rows of failed replicates."""

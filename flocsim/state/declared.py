@@ -53,11 +53,12 @@ def views_in(block: np.ndarray, kind: Any) -> Any:
     return kind(*made)
 
 
-def clear(arrays: Any) -> None:
-    """Set all arrays of a tuple, of which the first is as zeros_of made it, to zero; not those that
-    have been put in the place of others."""
+def block_of(arrays: Any) -> np.ndarray:
+    """Return the memory of a tuple that zeros_of has made, as whole numbers; what has been put in
+    the place of one of its arrays since then is not in it."""
     # A view's base is the block.
-    arrays[0].base.view(np.uint8).fill(0)
+    block: np.ndarray = arrays[0].base.view(np.int64)
+    return block
 
 
 def sizes_in(arrays: Any) -> dict[str, int]:

@@ -19,7 +19,7 @@ from flocsim.state.contacts import (
     SavedContact,
     VertexAtEdge,
 )
-from flocsim.state.declared import clear, enlarged, zeros_of
+from flocsim.state.declared import enlarged, zeros_of
 from flocsim.state.outlines import (
     MOST_FEET,
     MOST_ORDER,
@@ -215,7 +215,8 @@ def work_of(
         pieces=len(scene.pieces) + 1, features=len(scene.vertices) + 1,
         **sizes_of_pairs(n, pairs, room),
     )._replace(rules=gauss_rules())  # fmt: skip
-    begin(work, scene, position, velocity, all_pairs)
+    begin(scene, work, all_pairs)
+    work.place[NOW], work.velocity[NOW] = position, velocity
     return work
 
 
@@ -226,29 +227,30 @@ def sizes_of_pairs(n: int, pairs: int, room: int) -> dict[str, int]:
     }  # fmt: skip
 
 
-def begin(
-    work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray, all_pairs: bool = True
-) -> None:
-    """Write the start of a run into work arrays that are 0."""
+def begin(scene: Scene, work: Work, all_pairs: bool) -> None:
+    """Write what holds at the start of a run, but for its motion, into work arrays that are 0."""
     work.listed.first_body = -1
-    work.budget.fill(-1.0)
-    work.order[:] = range(len(work.order))
-    work.place[NOW], work.velocity[NOW] = position, velocity
-    if len(scene.bodies) <= ALL_PAIRS and all_pairs:
+    for pair in range(work.budget.shape[0]):
+        work.budget[pair] = -1.0
+    for place in range(work.order.shape[0]):
+        work.order[place] = place
+    if scene.bodies.shape[0] <= ALL_PAIRS and all_pairs:
         work.tally.pairs = all_counting(scene.bodies, work.pairs)
 
 
-def fits(work: Work, scene: Scene) -> bool:
-    """Return True if the work arrays of a scene have the sizes that another one of as many bodies
-    needs."""
-    sizes = len(work.near_features.later), len(work.near.first)
-    return sizes == (len(scene.vertices) + 1, len(scene.pieces) + 1)
-
-
-def begin_anew(work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray) -> None:
-    """Reset work arrays to those of work_of for a scene of as many bodies, faster than new ones."""
-    clear(work)
-    begin(work, scene, position, velocity)
+def fitting(work: Work | None, scene: Scene) -> Work:
+    """Return the work arrays, or larger ones, that have room for another scene of as many bodies;
+    new ones if there are none."""
+    if work is None:
+        motion = np.zeros((len(scene.bodies), 3))
+        return work_of(scene, motion, motion)
+    needed = {"features": len(scene.vertices) + 1, "pieces": len(scene.pieces) + 1}
+    room = {"features": len(work.near_features.later), "pieces": len(work.near.first)}
+    if all(room[name] >= needed[name] for name in needed):
+        return work
+    sizes = {name: max(room[name], needed[name]) for name in needed}
+    larger: Work = enlarged(work, **sizes)._replace(rules=work.rules)
+    return larger
 
 
 def motion_of(work: Work, state: int) -> np.ndarray:

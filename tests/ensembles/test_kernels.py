@@ -6,16 +6,13 @@ from scipy.spatial import ConvexHull
 
 from flocsim.ensembles.collision.draw import point, points_of
 from flocsim.ensembles.collision.mechanisms import settling_interval
-from flocsim.ensembles.collision.start import (
-    half_extent,
-    half_widths,
-    largest_displacement,
-    place_pair,
-)
+from flocsim.ensembles.collision.start import half_extent, half_widths
 from flocsim.ensembles.kind import study_of
+from flocsim.geometry.contact.core_points import outlines_of
 from flocsim.geometry.shapes.shape import Sphere
 from flocsim.geometry.shapes.spheropolygon import Composite, SpheroPolygon
 from tests.helpers.kernel_study import kernel_config
+from tests.helpers.placed_pairs import grazing, place_pair
 
 
 @pytest.fixture
@@ -120,11 +117,12 @@ def test_the_mean_interval_is_cauchys():
 def test_parts_of_unlike_spheroradii_reach_as_far_as_their_outline():
     turns = np.linspace(0.0, 2.0 * np.pi, 12)
     left, right = half_widths(HEADED, turns)
+    cores = outlines_of([HEADED])
     for place, turn in enumerate(turns):
         outline = np.concatenate(HEADED.outline(angle=turn, points_per_quadrant=500))[:, 0]
         assert left[place] == pytest.approx(-outline.min(), rel=1e-5, abs=0.0)
         assert right[place] == pytest.approx(outline.max(), rel=1e-5, abs=0.0)
-        extents = half_extent(HEADED, turn, -1.0), half_extent(HEADED, turn, 1.0)
+        extents = [half_extent(cores, 0, HEADED.radius, turn, side) for side in (-1.0, 1.0)]
         assert (left[place], right[place]) == pytest.approx(extents, rel=1e-12, abs=0.0)
 
 
@@ -133,9 +131,7 @@ def test_parts_of_unlike_spheroradii_reach_as_far_as_their_outline():
 def test_outlines_touch_exactly_within_the_interval(angles, other):
     shapes = (HOOK, other)
     low, high = settling_interval(shapes, np.array([angles[0]]), np.array([angles[1]]), 0.0, 0.0)
-    assert high[0] == pytest.approx(
-        largest_displacement("projected", HOOK, angles[0], other, angles[1]), rel=1e-12, abs=0.0
-    )
+    assert high[0] == pytest.approx(grazing(shapes, angles), rel=1e-12, abs=0.0)
     clear = sum(shape.bounding_radius for shape in shapes)
     gap = 1e-9
     for end in (low[0], high[0]):

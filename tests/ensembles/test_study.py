@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from flocsim import run
-from flocsim.ensembles.collision.draw import FAILED, FAILURES, Draw, draws
+from flocsim.ensembles.collision import batch
+from flocsim.ensembles.collision.batch import Batches
+from flocsim.ensembles.collision.draw import FAILED, FAILURES, draws
 from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.pairs.opened import replicate_of
 from flocsim.ensembles.storage.identity import identity_of
@@ -43,7 +44,7 @@ def test_a_row_has_all_columns_and_names_its_flocs(study):
 
 
 def test_a_replicate_that_is_given_up_has_no_row(study, monkeypatch):
-    monkeypatch.setattr(run, "STEPS_AT_A_TIME", 5)
+    monkeypatch.setattr(batch, "STEPS_AT_A_TIME", 5)
     looks = []
     whole = study.run(0, 4, 0.0, 0, halted=lambda: looks.append(0))
     assert len(looks) > 2
@@ -67,23 +68,24 @@ def test_what_runs_out_of_steps_is_tried_again_with_more(tmp_path):
 
 
 def test_what_fails_is_tried_again_more_exactly(study, monkeypatch):
-    tried, run = [], Draw.run
+    tried, run, usual = [], Batches.run, study.config.integrator.method
+    fails = [usual]
 
-    def failing(draw, driver, max_steps, halted=None, integrator=None):
-        tried.append((max_steps, integrator))
-        row = run(draw, driver, max_steps, halted, integrator)
-        if integrator is None:
-            row |= {"outcome": FAILED, "failure": FAILURES.index("too deep")}
-        return row
+    def failing(self, draws, max_steps, method, halted):
+        tried.append((max_steps, method))
+        rows, whys = run(self, draws, max_steps, method, halted)
+        if method in fails:
+            rows["outcome"], rows["failure"] = FAILED, FAILURES.index("too deep")
+        return rows, whys
 
     right = study.run(0, 4, 0.0, 1)
-    monkeypatch.setattr(Draw, "run", failing)
+    monkeypatch.setattr(Batches, "run", failing)
     row = study.run(0, 4, 0.0, 1)
     steps = study.config.integrator.max_steps
-    assert tried[:2] == [(steps, None), (5 * steps, study.exact[0])]
+    assert tried[:2] == [(steps, usual), (5 * steps, study.exact[0])]
     assert (row["outcome"], row["failure"]) == (right["outcome"], 0)
     # A second try that fails, too, leaves the first as it was.
-    monkeypatch.setattr(Draw, "run", lambda draw, *_, **__: failing(draw, *_[:2]))
+    fails.append(study.exact[0])
     assert study.run(0, 4, 0.0, 1)["outcome"] == FAILED
 
 

@@ -82,10 +82,11 @@ def capture_offset(folder, meeting, ratio, d_min, water=False):
     study = study_of(load_any_config(path))
     place = study.config.scene.names.index(f"{meeting}:10um-20um")
     encounter = study.encounter(place, 1, study.numbers(0))
-    driver = study.driver(encounter)
+    method = study.config.integrator.method
 
     def is_caught(offset):
-        row = Draw(encounter, (0.0, 0.0), offset).run(driver, 200_000)
+        draw = Draw(encounter, (0.0, 0.0), offset)
+        [row], _ = study.batches.run([lambda: draw], 200_000, method)
         assert OUTCOMES[row["outcome"]] in ("A", "C", "missed")
         return OUTCOMES[row["outcome"]] != "missed"
 

@@ -32,6 +32,7 @@ from flocsim.io.results.schema import (
     REPLICATES,
 )
 from flocsim.run import UNABLE, Run, force_to_blame
+from flocsim.state.clock import Clock, Counts
 from flocsim.state.work import work_of
 from flocsim.system import System
 
@@ -51,7 +52,7 @@ SAMPLE = 16
 FAILURES = ("none", "time limit", "step budget", "stalled", "too deep", "not finite", "exception")
 """Reasons of an undecided or failed outcome; a code is a place here."""
 
-ENDS = {
+ENDS: dict[int, tuple[str, str]] = {
     Status.FINISHED: ("undecided", "time limit"),
     Status.STEP_BUDGET: ("undecided", "step budget"),
     Status.STALLED: ("undecided", "stalled"),
@@ -59,9 +60,6 @@ ENDS = {
     Status.NOT_FINITE: ("failed", "not finite"),
 }
 """Ends without a decision, or in which the model was left: outcomes and reasons."""
-
-WHY = "why"
-"""Key of a row, beside the columns, for the words on a failure."""
 
 APART = {MISSED: "missed", HELD: "held"}
 """Outcomes of pairs that never touched."""
@@ -134,13 +132,18 @@ def as_draws(point: np.ndarray) -> np.ndarray:
     return point[[ANGLE_I, ANGLE_J, FLOC_I, FLOC_J, OFFSET]]
 
 
-def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, int]:
+def outcome_of(status: int, code: int, observed: np.ndarray) -> tuple[int, int]:
     """Return (outcome code, failure code) of a replicate whose run ended so."""
     if status == Status.STOPPED:
         name = APART.get(code) or CLASSES[int(observed[outcomes.INSIDE]), code]
         return OUTCOMES.index(name), 0
     name, reason = ENDS[status]
     return OUTCOMES.index(name), FAILURES.index(reason)
+
+
+def failed_row(reason: str) -> dict:
+    """Return the row of a replicate that has failed for one of FAILURES."""
+    return BLANK | {"outcome": FAILED, "failure": FAILURES.index(reason)}
 
 
 def columns_of(run: str) -> dict[str, str]:
@@ -176,51 +179,38 @@ class Draw:
         """
         encounter = self.encounter
         motion = encounter.motion(self.angles, self.share)
-        integrator = integrator or encounter.system.integrator
-        until = min(encounter.time_limit(self.share), until)
-        if not record and (run := encounter.spare_run()) is not None:
-            given = encounter.given
-            run.restart(driver, encounter.scene, motion, integrator, until, max_steps, given)
-            return run
         return Run(
-            driver, encounter.scene, work_of(encounter.scene, *motion), integrator, until,
+            driver, encounter.scene, work_of(encounter.scene, *motion),
+            integrator or encounter.system.integrator,
+            min(encounter.time_limit(self.share), until),
             max_steps=max_steps, observed=encounter.given.copy(), record=record,
         )  # fmt: skip
 
-    def run(
-        self, driver: Callable, max_steps: int, halted: Callable[[], bool] | None = None,
-        integrator: Integrator | None = None,
-    ) -> dict | None:  # fmt: skip
-        """Run the replicate; the row of the table of replicates as a dict.
-
-        ``halted()``, optional, is asked every some thousand steps whether to give up; the row is
-        None then. Others: as in begin.
-        """
-        run = self.begin(driver, max_steps, integrator=integrator)
-        status = run.to_end(halted)
-        row = None if status == Status.PAUSED else self.row(run, status)
-        self.encounter.take_back(run)
+    def row_of_run(self, run: Run, status: Status) -> dict:
+        """Return the row of a Run that has ended so; failed where a force gives no number."""
+        row = self.row(status, run.observed, run.clock, run.counts, run.error)
+        if status in UNABLE and force_to_blame(self.encounter.system, run.work, run.time):
+            row |= {"outcome": FAILED, "failure": FAILURES.index("not finite")}
         return row
 
-    def row(self, run: Run, status: Status) -> dict:
-        """Return the row of a Run that has ended so; failed where a force gives no number."""
-        observed, bodies = run.observed, run.scene.bodies
-        outcome, failure = outcome_of(status, run.code, observed)
-        row = BLANK | {
+    def row(
+        self, status: int, observed: np.ndarray, clock: Clock, counts: Counts, error: float
+    ) -> dict:  # fmt: skip
+        """Return the row of a run that has ended so: with these arrays, and a stated error [m]."""
+        outcome, failure = outcome_of(status, counts.code, observed)
+        row = BLANK | self.encounter.described
+        row |= {
             "angle_i": self.angles[0],
             "angle_j": self.angles[1],
-            "r_i": bodies[outcomes.BODY_I].equivalent_radius,
-            "r_j": bodies[outcomes.BODY_J].equivalent_radius,
-            "D_0": observed[outcomes.ZONE],
-            "outcome": outcome,
-            "d_c_last": observed[outcomes.D_LAST],
-            "t_end": run.time,
-            "steps": run.steps,
-            "rejected": run.rejected,
-            "error": run.error,
-            "failure": failure,
             "floc_i": self.flocs[0],
             "floc_j": self.flocs[1],
+            "outcome": outcome,
+            "failure": failure,
+            "d_c_last": observed[outcomes.D_LAST],
+            "t_end": clock.time,
+            "steps": counts.steps,
+            "rejected": counts.rejected,
+            "error": error,
         }
         if observed[outcomes.COLLIDED] == 1.0:
             row |= {
@@ -233,9 +223,6 @@ class Draw:
             }
         if OUTCOMES[outcome] in AGGREGATED:
             row["bond"] = int(observed[outcomes.BOND])
-        row |= self.encounter.measures
-        if status in UNABLE and (why := force_to_blame(self.encounter.system, run)):
-            row |= {"outcome": FAILED, "failure": FAILURES.index("not finite"), WHY: why}
         return row
 
     def system(self) -> System:

@@ -5,7 +5,6 @@ each way to meet.
 """
 
 import abc
-import contextlib
 import functools
 import math
 from collections.abc import Callable, Sequence
@@ -33,9 +32,8 @@ from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.forces.settling import largest_mobility, terminal_motion
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.io.results.schema import SHAPE_MEASURES
-from flocsim.run import Motion, Run
+from flocsim.run import Motion
 from flocsim.state.scene import Scene
-from flocsim.state.work import fits
 from flocsim.system import System
 
 LIMIT_TURNS = 1000.0
@@ -48,8 +46,10 @@ each other what spheres are there, and in a flow a strain brings them together b
 
 Arrays = tuple[np.ndarray, ...]
 
-Placed = tuple[np.ndarray, Sequence[tuple[float, float, float]]]
-"""Places [m, m, rad] and velocities [m/s, m/s, rad/s] (2, 3) of i and j."""
+Triple = tuple[float, float, float]
+
+Placed = tuple[tuple[Triple, ...], tuple[Triple, ...]]
+"""Places [m, m, rad] and velocities [m/s, m/s, rad/s] of i and j."""
 
 
 @attrs.frozen(eq=False, slots=False)
@@ -129,11 +129,6 @@ class Encounter(abc.ABC):
         return self.system.laws()
 
     @functools.cached_property
-    def spare(self) -> list[Run]:
-        """Runs that have ended, in whose arrays those to come begin."""
-        return self.first.spare if self.first else []
-
-    @functools.cached_property
     def scene(self) -> Scene:
         """The two bodies as arrays for the driver, their laws compiled."""
         scene = self.system.scene(laws=self.laws, near=True)
@@ -170,13 +165,21 @@ class Encounter(abc.ABC):
         return tuple(body.shape for body in self.system.bodies)
 
     @functools.cached_property
-    def measures(self) -> dict[str, float]:
-        """{column: value} of the shape measures of i and j."""
-        return {
+    def radii(self) -> np.ndarray:
+        """R_i and R_j [m]."""
+        return np.array([shape.bounding_radius for shape in self.shapes])
+
+    @functools.cached_property
+    def described(self) -> dict[str, float]:
+        """{column: value} of what rows of replicates say of the two: their sizes, D_0, and the
+        shape measures."""
+        sizes = {"r_i": self.shapes[0].equivalent_radius, "r_j": self.shapes[1].equivalent_radius}
+        measures = {
             f"{name}_{body}": getattr(shape.measures, name)
             for body, shape in zip("ij", self.shapes, strict=True)
             for name in SHAPE_MEASURES
         }
+        return sizes | {"D_0": self.zone_distance} | measures
 
     @property
     def rate(self) -> float | None:
@@ -299,17 +302,3 @@ class Encounter(abc.ABC):
         """Return positions and velocities (2, 3) at the start of a replicate: see Draw."""
         place, velocity = self.places(angles, share)
         return np.array(place), np.array(velocity)
-
-    def spare_run(self) -> Run | None:
-        """Return a run that has ended, in whose arrays another one may begin; None if there is
-        none."""
-        with contextlib.suppress(IndexError):  # none is left, or another thread has taken it
-            while not fits((run := self.spare.pop()).work, self.scene):
-                pass
-            return run
-        return None
-
-    def take_back(self, run: Run) -> None:
-        """Let a run to come begin in the arrays of one that has ended."""
-        run.keep(self.first or self)
-        self.spare.append(run)

@@ -29,9 +29,10 @@ import attrs
 import numpy as np
 
 from flocsim.body import Body
+from flocsim.compiler.composer import compiled
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import LIMIT_TURNS, Arrays, Encounter, Placed
-from flocsim.ensembles.collision.start import half_widths, largest_displacement, place_pair
+from flocsim.ensembles.collision.start import half_widths, place_above
 from flocsim.ensembles.collision.turning import angles_by_turning, turning_rates
 from flocsim.ensembles.config.pair_scene import BROWNIAN, EXTENSION, SETTLING, SHEAR, PairScene
 from flocsim.ensembles.config.schema import Config
@@ -113,16 +114,26 @@ class Settling(Encounter):
         return self.start_gap / self.speed + LIMIT_TURNS * self.turn_time
 
     def places(self, angles: Sequence[float], share: float) -> Placed:
-        i, j = self.shapes
-        largest = largest_displacement(self.options.delta_max, i, angles[0], j, angles[1])
-        offset = share * largest * self.bent
-        place = place_pair(self.shapes, angles, offset, self.start_gap, self.scene)
-        if isinstance(self.options.start_gap, str):
-            # Forces between the centres do not know how thin the outlines are.
-            clear = self.size + self.start_gap
-            x = float(place[1, 0])
-            place[1, 1] = max(place[1, 1], math.sqrt(max(clear * clear - x * x, 0.0)))
-        return place, [(*velocity, 0.0) for velocity, _ in self.settling]
+        far = (*self.extents, share * self.bent, self.start_gap, self.clear)
+        x, y = compiled(place_above)(self.scene, *angles, *far)
+        return ((0.0, 0.0, angles[0]), (x, y, angles[1])), self.falling
+
+    @functools.cached_property
+    def extents(self) -> tuple[float, ...]:
+        """Spheroradii of i and j, R_i + R_j, and δ_max where it is not that of the outlines [m]."""
+        radii = (float(shape.radius) for shape in self.shapes)
+        return *radii, self.outer, self.outer if self.options.delta_max == "radius" else 0.0
+
+    @functools.cached_property
+    def clear(self) -> float:
+        """Least distance of the centroids at the start [m], unless a gap of outlines is given:
+        forces between the centres do not know how thin these are."""
+        return self.size + self.start_gap if isinstance(self.options.start_gap, str) else 0.0
+
+    @functools.cached_property
+    def falling(self) -> tuple[tuple[float, float, float], ...]:
+        """Velocities of i and j at the start [m/s, m/s, rad/s]."""
+        return tuple((float(x), float(y), 0.0) for (x, y), _ in self.settling)
 
     @functools.cached_property
     def bent(self) -> float:
@@ -260,8 +271,8 @@ class InFlow(Weightless):
         # Both go along with the flow.
         xx, xy, yx, yy = self.system.fluid.gradient
         spin = 0.5 * (yx - xy)
-        place = np.array([[0.0, 0.0, angles[0]], [x, y, angles[1]]])
-        return place, [(0.0, 0.0, spin), (xx * x + xy * y, yx * x + yy * y, spin)]
+        place = (0.0, 0.0, angles[0]), (x, y, angles[1])
+        return place, ((0.0, 0.0, spin), (xx * x + xy * y, yx * x + yy * y, spin))
 
     def bounds(self, angles_i: np.ndarray, angles_j: np.ndarray) -> Arrays:
         largest = np.full(len(angles_i), self.outer + self.reach)
@@ -375,7 +386,7 @@ class Brownian(Weightless):
     def places(self, angles: Sequence[float], share: float) -> Placed:
         far, turn = self.ends[0], 2.0 * math.pi * share
         apart = far * math.cos(turn), far * math.sin(turn)
-        return np.array([[0.0, 0.0, angles[0]], [*apart, angles[1]]]), [(0.0, 0.0, 0.0)] * 2
+        return ((0.0, 0.0, angles[0]), (*apart, angles[1])), ((0.0, 0.0, 0.0),) * 2
 
 
 MECHANISMS: dict[str, type[Encounter]] = {

@@ -12,24 +12,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flocsim.compiler.composer import compiled
 from flocsim.ensembles.config.schema import ZoneConfig
 from flocsim.errors import ZoneError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.base import Force
-from flocsim.geometry.contact.core_points import outlines_of
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.state.scene import Scene
 
 LARGEST_RATIO = 4.0 / math.e**2
 """S above which attraction wins at every distance."""
-
-
-def half_extent(shape: Shape, angle: float, side: float) -> float:
-    """Return the extent of a turned outline from its centroid [m], towards +x (``side`` 1) or −x
-    (−1)."""
-    across = side * math.cos(angle), -side * math.sin(angle)
-    return float(max([part.radius + (part.points @ across).max() for part in shape.parts]))
 
 
 def half_widths(shape: Shape, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -43,14 +33,22 @@ def half_widths(shape: Shape, angles: np.ndarray) -> tuple[np.ndarray, np.ndarra
     )
 
 
-def largest_displacement(
-    rule: str, shape_i: Shape, angle_i: float, shape_j: Shape, angle_j: float
-) -> float:
-    """Return δ_max [m]: facing half-extents ("projected", 1 just grazes), or R_i + R_j
-    ("radius")."""
-    if rule == "radius":
-        return shape_i.bounding_radius + shape_j.bounding_radius
-    return half_extent(shape_i, angle_i, 1.0) + half_extent(shape_j, angle_j, -1.0)
+def half_extent(bodies, body, radius, angle, side):
+    """Return the extent of a turned outline from its centroid [m], towards +x (``side`` 1) or −x
+    (−1); ``radius``: its spheroradius."""
+    vertices, largest = bodies.vertices, -math.inf
+    across, along = side * math.cos(angle), -side * math.sin(angle)
+    for point in range(bodies.first[body], bodies.first[body + 1]):
+        reach = vertices[point].x * across + vertices[point].y * along
+        largest = max(largest, reach + vertices[point].excess_radius)
+    return largest + radius
+
+
+def grazing_offset(bodies, angle_i, angle_j, radius_i, radius_j):
+    """Return the displacement [m] at which the outlines of i and j just graze as j passes on the
+    right: the sum of the half-extents that face each other."""
+    right = half_extent(bodies, 0, radius_i, angle_i, 1.0)
+    return right + half_extent(bodies, 1, radius_j, angle_j, -1.0)
 
 
 def top_of_edge(ax, ay, bx, by, radius, x):
@@ -107,19 +105,35 @@ def start_height(bodies, angle_i, angle_j, contact, reach, displacement, gap):
     return highest if highest > -clear else clear
 
 
-def place_pair(
-    shapes: Sequence[Shape], angles: Sequence[float], displacement: float, gap: float,
-    scene: Scene | None = None,
-) -> np.ndarray:  # fmt: skip
-    """Return places (2, 3) [m, m, rad] of i at the origin and j above it; ``scene``: that of
-    the two, where it is at hand."""
-    contact = shapes[0].radius + shapes[1].radius
-    reach = shapes[0].bounding_radius + shapes[1].bounding_radius
-    height = compiled(start_height)(
-        scene or outlines_of(shapes), float(angles[0]), float(angles[1]),
-        contact, reach, float(displacement), gap,
-    )  # fmt: skip
-    return np.array([[0.0, 0.0, angles[0]], [displacement, height, angles[1]]])
+def place_above(
+    bodies, angle_i, angle_j, radius_i, radius_j, reach, largest, share, gap, clear
+):  # fmt: skip
+    """Return where j's centroid starts from i's, (x, y) [m]: above it, and displaced sideways.
+
+    Parameters
+    ----------
+    bodies : Scene or Outlines
+        Those of i and j.
+    angle_i, angle_j, radius_i, radius_j : float
+        Orientations [rad] and spheroradii [m].
+    reach : float
+        R_i + R_j [m].
+    largest : float
+        δ_max [m]; 0: that at which the outlines just graze.
+    share : float
+        The displacement over δ_max.
+    gap : float
+        Distance of the outlines as j comes straight down [m].
+    clear : float
+        Least distance of the centroids [m]; 0: any.
+    """
+    if largest == 0.0:
+        largest = grazing_offset(bodies, angle_i, angle_j, radius_i, radius_j)
+    x, contact = share * largest, radius_i + radius_j
+    y = start_height(bodies, angle_i, angle_j, contact, reach, x, gap)
+    if abs(x) < clear:
+        y = max(y, math.sqrt(clear * clear - x * x))
+    return x, y
 
 
 def attraction_ratio(attraction: VanDerWaals, layer: DoubleLayer) -> float:

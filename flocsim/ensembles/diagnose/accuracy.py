@@ -85,7 +85,7 @@ class Bench:
             self.warm.add(driver)
         began = time.process_time()
         made = draw.begin(driver, budget, until, integrator=method)
-        row = draw.row(made, made.to_end())
+        row = draw.row_of_run(made, made.to_end())
         return made, row, time.process_time() - began
 
     @property

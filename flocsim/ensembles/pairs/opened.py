@@ -89,7 +89,7 @@ def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
         fresh = functools.partial(begin_replicate, draw, steps, method)
         run = fresh(record=True)
         status = run.to_end()
-        row = draw.row(run, status)
+        row = draw.row_of_run(run, status)
         origin = Origin(
             system.bodies, system.forces, system.fluid, method or system.integrator, fresh, run,
             ((run.steps, float(run.clock.until)),),

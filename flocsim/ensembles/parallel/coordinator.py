@@ -247,24 +247,22 @@ def run_chunk(
 
     ``tell`` takes what is kept of a replicate while it runs, and how far it is.
     """
-    rows = np.zeros(chunk.stop - chunk.first, study.row)
     condition = study.conditions[chunk.condition]
+    parts = [np.zeros(0, study.row)]
     notes: list[dict] = []
-    count = 0
-    until = time.monotonic() + seconds
-    for replicate in range(chunk.first, chunk.stop):
-        if halted() or (count and time.monotonic() > until):
-            break
+    first, until = chunk.first, time.monotonic() + seconds
+    while first < chunk.stop and not halted():
 
-        def keep(name: str, about: dict, data: bytes, replicate: int = replicate) -> None:
+        def keep(name: str, about: dict, data: bytes, replicate: int = first) -> None:
             tell(Kept(chunk.condition, replicate, name, about, data))
 
-        row, note = study.run_task(
-            condition, replicate, halted, chunk.left, keep, lambda words: tell(Going(words))
+        rows, more = study.run_some(
+            condition, first, chunk.stop, halted, chunk.left, keep, lambda words: tell(Going(words))
         )
-        if row is None:
+        parts.append(rows)
+        notes += more
+        first += len(rows)
+        if not len(rows) or time.monotonic() > until:
             break
-        rows[count] = tuple(row[name] for name in rows.dtype.fields or ())
-        notes += [note] if note else []
-        count += 1
-    return ChunkResult(chunk._replace(left=None), rows[:count], tuple(notes[:MOST_NOTES]))
+    rows = np.concatenate(parts)
+    return ChunkResult(chunk._replace(left=None), rows, tuple(notes[:MOST_NOTES]))

@@ -244,6 +244,7 @@ def record_and_observe(scene, work, observed, clock, counts, record, needs_lists
     return STOPPED if counts.code != 0 else 0
 
 
+@apart
 def advance(scene, work, observed, clock, counts, record):
     """Advance a run until a Status ends or pauses it.
 

@@ -77,10 +77,9 @@ def test_a_replicate_repeats_to_the_bit_in_any_order(study):
 def test_work_arrays_are_used_again_for_other_flocs_too(study, tmp_path):
     """Those of one run serve the next; a study that has run nothing else finds the same."""
     study.run(0, 16, 0.0, 0)
-    spare = study.draw(0, 16, 0.0, 1).encounter.spare
-    before = [id(work) for work in spare]
+    before = [id(work) for work in study.batches.arrays.values()]
     rows = [study.run(0, 16, share, replicate) for share in (0.0, 0.5) for replicate in (1, 2, 3)]
-    assert before and [id(work) for work in spare] == before
+    assert before and [id(work) for work in study.batches.arrays.values()] == before
     fresh = small_study(tmp_path)
     assert same_row(fresh.run(0, 16, 0.5, 3), rows[-1])
 
@@ -90,7 +89,7 @@ def recorded(study):
     draw = study.draw(0, 16, 0.0, 0)
     steps = study.config.integrator.max_steps
     run = draw.begin(study.driver(draw.encounter), steps, record=True)
-    return draw.row(run, run.to_end()), run.motion()
+    return draw.row_of_run(run, run.to_end()), run.motion()
 
 
 def test_recording_changes_nothing(study):

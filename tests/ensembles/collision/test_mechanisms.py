@@ -1,6 +1,7 @@
 """How bodies meet in flows: where they start, how they turn, what is far and what may be caught."""
 
 import math
+from functools import partial
 
 import attrs
 import numpy as np
@@ -170,9 +171,10 @@ def test_spheres_without_forces_touch_where_their_ways_meet(tmp_path, meeting):
     study = Study(config)
     place = config.scene.names.index(f"{meeting}:10um-20um")
     encounter = study.encounter(place, 1, np.zeros(5))
-    driver = study.driver(encounter)
-    for share, touches in ((0.9, True), (-0.99, True), (1.01, False), (-1.2, False)):
-        row = Draw(encounter, (0.0, 0.0), share).run(driver, 100_000)
+    shares = {0.9: True, -0.99: True, 1.01: False, -1.2: False}
+    draws = [partial(Draw, encounter, (0.0, 0.0), share) for share in shares]
+    rows, _ = study.batches.run(draws, 100_000, config.integrator.method)
+    for (share, touches), row in zip(shares.items(), rows, strict=True):
         assert OUTCOMES[row["outcome"]] in ("ABCD" if touches else ("missed",)), share
 
 

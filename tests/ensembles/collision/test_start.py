@@ -7,8 +7,8 @@ from shapely.geometry import LineString, Point, Polygon
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.ensembles.collision.draw import draws
-from flocsim.ensembles.collision.start import largest_displacement, place_pair
 from flocsim.io.results.schema import OUTCOMES
+from tests.helpers.placed_pairs import grazing, place_pair
 from tests.helpers.small_study import small_study
 
 GAP = 2e-6
@@ -65,7 +65,7 @@ def facing_heights(shapes, angles):
 )
 def test_the_outlines_start_a_gap_apart(share, gap):
     for shapes, angles in pairs(30):
-        largest = largest_displacement("projected", shapes[0], angles[0], shapes[1], angles[1])
+        largest = grazing(shapes, angles)
         places = place_pair(shapes, angles, share * largest, gap)
         assert gap_of(shapes, places) == pytest.approx(gap, rel=2e-6, abs=1e-15)
         assert places[1, :2].tolist() == pytest.approx([share * largest, places[1, 1]])
@@ -77,7 +77,7 @@ def test_the_outlines_start_a_gap_apart(share, gap):
 
 def test_one_just_grazes():
     for shapes, angles in pairs(40):
-        largest = largest_displacement("projected", shapes[0], angles[0], shapes[1], angles[1])
+        largest = grazing(shapes, angles)
         level, heights = facing_heights(shapes, angles)
         assert slide(shapes, angles, largest, [level])[0] == pytest.approx(0.0, abs=1e-15)
         assert min(slide(shapes, angles, 1.0001 * largest, [level, *heights])) > 0.0
@@ -86,7 +86,7 @@ def test_one_just_grazes():
 
 def test_a_pair_that_passes_by_starts_clear_above():
     for shapes, angles in pairs(30):
-        largest = largest_displacement("radius", shapes[0], angles[0], shapes[1], angles[1])
+        largest = sum(shape.bounding_radius for shape in shapes)
         places = place_pair(shapes, angles, 2.0 * largest, GAP)
         assert gap_of(shapes, places) >= GAP
         assert places[1, 1] >= largest
@@ -105,8 +105,7 @@ def test_at_the_radius_rules_end_attraction_alone_brings_spheres_together(tmp_pa
 
 def test_by_the_radius_rule_a_straight_fall_never_overlaps():
     for shapes, angles in pairs(30):
-        largest = largest_displacement("radius", shapes[0], angles[0], shapes[1], angles[1])
-        assert largest == sum(shape.bounding_radius for shape in shapes)
+        largest = sum(shape.bounding_radius for shape in shapes)
         heights = facing_heights(shapes, angles)[1]
         assert min(slide(shapes, angles, largest, heights)) > -1e-15
 

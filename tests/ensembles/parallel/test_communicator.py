@@ -107,14 +107,14 @@ from flocsim.ensembles.study import Study
 from flocsim.forces import CentreForce
 
 
-def run(study, condition, vertices, share, replicate, *more, original=Study.run):
-    if more:  # halted: not while it compiles
+def run_some(study, condition, first, stop, *more, original=Study.run_some):
+    if len(more) > 1:  # not while it compiles
         raise MemoryError
-    return original(study, condition, vertices, share, replicate, *more)
+    return original(study, condition, first, stop, *more)
 
 
 if launched_rank() == 1:
-    Study.run = run
+    Study.run_some = run_some
 
 
 @attrs.frozen

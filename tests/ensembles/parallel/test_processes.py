@@ -88,7 +88,8 @@ def test_a_study_knows_which_engines_the_disk_has(tmp_path, environment):
     assert study.uncompiled(study.kinds) == []
     environment["FLOCSIM_CACHE"] = str(tmp_path / "cache")
     assert study.uncompiled(study.kinds) == study.kinds
-    name = study.driver(study.draw(*study.kinds[0], 0.0, 0).encounter).name
+    encounter = study.draw(*study.kinds[0], 0.0, 0).encounter
+    name = study.batches.driver(encounter, config.integrator.method).name
     (tmp_path / "cache" / f"{name}-1234.code").touch()
     assert study.uncompiled(study.kinds) == study.kinds[1:]
     environment["FLOCSIM_CACHE"] = str(tmp_path / "small.toml" / "no folder")
