@@ -121,10 +121,10 @@ class Work(NamedTuple):
     place: Annotated[np.ndarray, (ALL_STATES, "n", 3)]  # positions, angles in all states [m, rad]
     velocity: Annotated[np.ndarray, (ALL_STATES, "n", 3)]  # velocities and spins [m/s, rad/s]
     force: Annotated[np.ndarray, (STATES, "n", 3)]  # forces and torques [N, N m]
-    series: Annotated[np.ndarray, (2, TERMS, "few", 3)]  # terms of a motion, see MOTION [m, rad]
-    remainder: Annotated[np.ndarray, (2, 4, "few", 3)]  # R₀, r₁, r₂, r₃ of its force [N, N m]
-    weights: Annotated[np.ndarray, (2, "few", 3)]  # see MOVED
-    linear: Annotated[np.ndarray, (2, "few", "few", 3, 3)]  # D/h and K, see DAMPING
+    series: Annotated[np.ndarray, (2, TERMS, "few", 4)]  # terms of a motion, see MOTION [m, rad]
+    remainder: Annotated[np.ndarray, (2, 4, "few", 4)]  # R₀, r₁, r₂, r₃ of its force [N, N m]
+    weights: Annotated[np.ndarray, (2, "few", 4)]  # see MOVED
+    linear: Annotated[np.ndarray, (2, "few", "few", 3, 4)]  # D/h and K, see DAMPING
     slip: Annotated[np.ndarray, (STATES, "rows")]  # tangential displacements ξ [m]
     slip_rate: Annotated[np.ndarray, (STATES, "rows")]  # their rates [m/s]
     contacts: Annotated[np.ndarray, ("rows",), ContactState]

@@ -106,8 +106,8 @@ def write_changes(work, stage, step, fraction):
                     # Minus the linear part with its sign: K and D are minus the derivatives.
                     moved = work.place[stage, other, j] - work.place[NOW, other, j]
                     faster = work.velocity[stage, other, j] - work.velocity[NOW, other, j]
-                    change += linear[STIFFNESS, body, other, i, j] * moved
-                    change += linear[DAMPING, body, other, i, j] * step * faster
+                    change += linear[STIFFNESS, body, other, j, i] * moved
+                    change += linear[DAMPING, body, other, j, i] * step * faster
             work.force[stage, body, i] = change - remainder_at(work, fraction, body, i)
 
 

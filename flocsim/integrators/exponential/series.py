@@ -11,6 +11,7 @@ small change of the motion, or of R.
 
 import math
 
+from flocsim.compiler.linker import loops_apart
 from flocsim.constants import TINY
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.views import inertia, lever
@@ -43,8 +44,8 @@ def store_block(work, block, body, other, step):
     for i in range(3):
         for j in range(3):
             stiffness = work.jacobian[STIFFNESS, block, i, j]
-            work.linear[STIFFNESS, body, other, i, j] = stiffness
-            work.linear[DAMPING, body, other, i, j] = work.jacobian[DAMPING, block, i, j] / step
+            work.linear[STIFFNESS, body, other, j, i] = stiffness
+            work.linear[DAMPING, body, other, j, i] = work.jacobian[DAMPING, block, i, j] / step
 
 
 def write_term(work, which, k):
@@ -52,32 +53,38 @@ def write_term(work, which, k):
     series, linear, weights, largest = work.series, work.linear, work.weights, 0.0
     after, factor = k + 1.0, 1.0 / ((k + 1.0) * (k + 2.0))
     for body in range(work.place.shape[1]):
-        first = second = third = 0.0
+        x = y = angle = none = 0.0
         if k < 4:
             # r_k for k ≤ 3. The series of the motion starts here from k = 1: its term 2 holds the
             # forces at the start.
-            first = work.remainder[which, k, body, 0]
-            second = work.remainder[which, k, body, 1]
-            third = work.remainder[which, k, body, 2]
+            x = work.remainder[which, k, body, 0]
+            y = work.remainder[which, k, body, 1]
+            angle = work.remainder[which, k, body, 2]
+            none = work.remainder[which, k, body, 3]
+        drag_x = drag_y = drag_angle = drag_none = 0.0
         for other in range(work.place.shape[1]):
             for j in range(3):
                 # Subtract K c_k and (k + 1)/h D c_{k+1} of all bodies.
                 position = series[which, k, other, j]
                 speed = after * series[which, k + 1, other, j]
-                first -= linear[STIFFNESS, body, other, 0, j] * position
-                first -= linear[DAMPING, body, other, 0, j] * speed
-                second -= linear[STIFFNESS, body, other, 1, j] * position
-                second -= linear[DAMPING, body, other, 1, j] * speed
-                third -= linear[STIFFNESS, body, other, 2, j] * position
-                third -= linear[DAMPING, body, other, 2, j] * speed
-        first *= factor * weights[MOVED, body, 0]
-        second *= factor * weights[MOVED, body, 1]
-        third *= factor * weights[MOVED, body, 2]
-        series[which, k + 2, body, 0] = first
-        series[which, k + 2, body, 1] = second
-        series[which, k + 2, body, 2] = third
-        turning = weights[LEVER, body, 2] * abs(third)
-        largest = max(largest, abs(first), abs(second), turning)
+                x -= linear[STIFFNESS, body, other, j, 0] * position
+                y -= linear[STIFFNESS, body, other, j, 1] * position
+                angle -= linear[STIFFNESS, body, other, j, 2] * position
+                none -= linear[STIFFNESS, body, other, j, 3] * position
+                drag_x += linear[DAMPING, body, other, j, 0] * speed
+                drag_y += linear[DAMPING, body, other, j, 1] * speed
+                drag_angle += linear[DAMPING, body, other, j, 2] * speed
+                drag_none += linear[DAMPING, body, other, j, 3] * speed
+        x = (x - drag_x) * (factor * weights[MOVED, body, 0])
+        y = (y - drag_y) * (factor * weights[MOVED, body, 1])
+        angle = (angle - drag_angle) * (factor * weights[MOVED, body, 2])
+        none = (none - drag_none) * (factor * weights[MOVED, body, 3])
+        series[which, k + 2, body, 0] = x
+        series[which, k + 2, body, 1] = y
+        series[which, k + 2, body, 2] = angle
+        series[which, k + 2, body, 3] = none
+        turning = weights[LEVER, body, 2] * abs(angle)
+        largest = max(largest, abs(x), abs(y), turning)
     return largest
 
 
@@ -136,13 +143,14 @@ def phase_bound(work):
             total = 0.0
             for other in range(work.place.shape[1]):
                 for j in range(3):
-                    size = abs(work.linear[STIFFNESS, body, other, axis, j])
+                    size = abs(work.linear[STIFFNESS, body, other, j, axis])
                     total += size / weights[LEVER, other, j]
             total *= weights[MOVED, body, axis] * weights[LEVER, body, axis]
             largest = max(largest, total)
     return math.sqrt(largest)
 
 
+@loops_apart
 def write_terms(work, which, first, step, goal):
     """Write the terms of a series from ``first`` + 2 on, until they matter less than ``goal`` [m].
 
