@@ -54,7 +54,7 @@ TRIED_AGAIN = ("step budget", "stalled", "too deep", "not finite")
 """Failures behind which more steps, or shorter ones, may come to an outcome."""
 
 
-BATCH_SECONDS, MOST_AT_A_TIME = 0.05, 256
+BATCH_SECONDS, MOST_AT_A_TIME = 0.1, 256
 """Time for which replicates run before their rows are handed in, and most of them."""
 
 
