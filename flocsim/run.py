@@ -199,25 +199,14 @@ class Run:
     def error(self) -> float:
         """Stated error of the motion [m]; inf where nothing is known of it (see known_error)."""
         start, now = self.saved[0][0], self.row_now()[0]
-        first, last = (row[1:].reshape(-1, 6)[:, 3:] for row in (start, now))
-        sizes = self.scene.bodies["bounding_radius"]
-        return stated_error(float(self.clock.error), first, last, sizes, now[0] - start[0])
+        velocity = np.stack([row[1:].reshape(-1, 6)[:, 3:] for row in (start, now)])
+        sizes, elapsed = self.scene.bodies["bounding_radius"], now[0] - start[0]
+        return float(known_error(np.array(self.clock.error), velocity, sizes, elapsed))
 
     @property
     def code(self) -> int:
         """Last code of the observer."""
         return int(self.counts.code)
-
-
-def stated_error(
-    stated: float, first: np.ndarray, last: np.ndarray, sizes: np.ndarray, elapsed: float
-) -> float:
-    """Return the stated error of a run [m] by its velocities at the start and at the end; see
-    known_error."""
-    # Below the size of a body it is known.
-    if stated <= sizes.max():
-        return float(stated)
-    return float(known_error(np.array(stated), np.stack([first, last]), sizes, elapsed))
 
 
 def known_error(
@@ -237,9 +226,13 @@ def known_error(
         Duration of the run [s].
     """
     speeds = np.hypot(velocity[..., 0], velocity[..., 1]) + sizes * np.abs(velocity[..., 2])
+    return within_reach(stated, speeds.max(initial=0.0), sizes.max(initial=0.0), elapsed)
+
+
+def within_reach(stated: Any, speed: Any, size: Any, elapsed: Any) -> np.ndarray:
+    """Return the same for bodies of at most this speed [m/s] and size [m]: numbers, or arrays."""
     # In this time nothing has moved further than by about this, right or wrong.
-    reach = speeds.max(initial=0.0) * elapsed + sizes.max(initial=0.0)
-    return np.where(stated > reach, np.inf, stated)
+    return np.where(stated > speed * elapsed + size, np.inf, stated)
 
 
 def locate(scene: Any, work: Work) -> bool:

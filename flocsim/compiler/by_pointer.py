@@ -10,23 +10,11 @@ makes of a table: flocsim.compiler.table_types.
 import ctypes
 import functools
 import struct
-import weakref
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
 from flocsim.errors import KernelError
-
-DOUBLE = struct.Struct("@d")
-"""Packs one number, the argument that calls have most of, without looking at its type again."""
-
-
-class Kept(NamedTuple):
-    """What is remembered of an argument; see `keep`."""
-
-    value: Any
-    table: bytes  # its part of a table
-    kinds: int  # place of its types in KINDS: comparing these would take longer than all else
 
 
 class Stacked(NamedTuple):
@@ -34,13 +22,6 @@ class Stacked(NamedTuple):
 
     words: np.ndarray  # (tables, words) of int64
     one: Any  # an argument that has such a table
-
-
-KEPT: dict[int, Kept] = {}
-"""{id of an argument: what is remembered of it}."""
-
-KINDS: list[tuple[Any, ...]] = []
-"""The types of all arguments that have been remembered, each once."""
 
 
 def as_plain(value: Any) -> Any:
@@ -64,18 +45,6 @@ def address_of(value: Any) -> int:
     return int(plain.ctypes.data)
 
 
-def keep(value: Any, owner: Any) -> None:
-    """Remember what an array, a record or a tuple of such is in tables while its owner lives: they
-    are then made in a fraction of the time. Its arrays may not be exchanged meanwhile."""
-    if id(value) not in KEPT:
-        words, kinds = flat(value)
-        if kinds not in KINDS:
-            KINDS.append(kinds)
-        # The entry holds the argument itself, so that no other object is given its id meanwhile.
-        KEPT[id(value)] = Kept(value, packed(words), KINDS.index(kinds))
-        weakref.finalize(owner, KEPT.pop, id(value), None)
-
-
 def letter_of(value: Any) -> str:
     """Return the letter (struct) of a number; "" for a law of a scene that runs uncompiled, and for
     None: nothing that compiled code could use."""
@@ -91,7 +60,8 @@ def flatten(value, words, kinds):
     if isinstance(value, Stacked):
         flatten(value.words, words, kinds)
         words.pop()  # the tables alone are counted, as their length is known
-        kinds.extend(flat(value.one)[1])
+        kinds.append(Stacked)
+        flatten(value.one, [], kinds)
     elif isinstance(value, np.ndarray):
         # Sizes are words and not part of the type: arrays of any size share machine code.
         words.append(address_of(value))
@@ -111,43 +81,14 @@ def flatten(value, words, kinds):
         kinds.append(letter)
 
 
-def flat(value: Any) -> tuple[list[Any], tuple[Any, ...]]:
-    """Return an argument as words, and their types as a flat tuple: a tuple is (its class, its
+def table_of(arguments: tuple[Any, ...]) -> tuple[bytes, tuple[Any, ...]]:
+    """Return the arguments as a table, and their types as a flat tuple: a tuple is (its class, its
     length) before its items, an array (its dtype, its dimensions)."""
     words: list[Any] = []
     kinds: list[Any] = []
-    flatten(value, words, kinds)
-    return words, tuple(kinds)
-
-
-def packed(words: list[Any]) -> bytes:
-    """Return words as they lie in a table."""
+    flatten(arguments, words, kinds)
     letters = ("d" if isinstance(each, float) else "q" for each in words)
-    return struct.pack("@" + "".join(letters), *words)
-
-
-def table_and_kinds(value: Any) -> tuple[bytes, Any]:
-    """Return an argument's part of a table, and what tells its types."""
-    if (kept := KEPT.get(id(value))) is not None:
-        return kept.table, kept.kinds
-    words, kinds = flat(value)
-    return packed(words), kinds
-
-
-def table_of(arguments: tuple[Any, ...]) -> tuple[bytes, tuple[Any, ...]]:
-    """Return the arguments as a table, and what tells their types: of each those of `flat`, or
-    their place in KINDS."""
-    parts: list[bytes] = []
-    kinds: list[Any] = []
-    for each in arguments:
-        if type(each) is float:
-            parts.append(DOUBLE.pack(each))
-            kinds.append(("d",))
-        else:
-            part, own = table_and_kinds(each)
-            parts.append(part)
-            kinds.append(own)
-    return b"".join(parts), tuple(kinds)
+    return struct.pack("@" + "".join(letters), *words), tuple(kinds)
 
 
 @functools.cache
@@ -162,12 +103,8 @@ def sizes_of(named: Any) -> dict[str, tuple[int, ...]]:
 
 
 def kinds_text(kinds: tuple[Any, ...]) -> str:
-    """Return the types of arguments, as of table_of, as text that differs where machine code may:
-    with the names of fields in their order, and sizes that are declared."""
+    """Return the types of arguments as text that differs where machine code may: with the names of
+    fields in their order, and sizes that are declared."""
     # The repr of a class is its name: two of one name may have other fields.
-    all_kinds = [KINDS[each] if isinstance(each, int) else each for each in kinds]
-    flat_kinds = [each for one in all_kinds for each in one]
-    named = [
-        each[0] for each in flat_kinds if isinstance(each, tuple) and hasattr(each[0], "_fields")
-    ]
-    return repr((flat_kinds, [(each._fields, sizes_of(each)) for each in named]))
+    named = [each[0] for each in kinds if isinstance(each, tuple) and hasattr(each[0], "_fields")]
+    return repr((kinds, [(each._fields, sizes_of(each)) for each in named]))

@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pytest
 
-from flocsim.compiler.by_pointer import KEPT, keep, kinds_text, table_of
+from flocsim.compiler.by_pointer import Stacked, table_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import KernelError
 
@@ -90,19 +90,19 @@ def both(function, *arguments):
     return found
 
 
-class Owner:
-    """Of what stays."""
+def takes(states, number, k):
+    states[number].counts[k] += 1
+    return reads(states[number], k)
 
 
-def test_what_stays_is_told_alike_until_its_owner_is_gone():
-    state, owner = outer(), Owner()
-    table, kinds = table_of((state, 1.5))
-    keep(state, owner)
-    kept_table, kept_kinds = table_of((state, 1.5))
-    assert table == kept_table and kinds_text(kinds) == kinds_text(kept_kinds)
-    assert id(state) in KEPT
-    del owner
-    assert id(state) not in KEPT
+def test_stacked_tables_are_taken_by_their_numbers():
+    each, plain = [outer(), outer()], outer()
+    each[1].places[:] += 2.0
+    words = np.array([np.frombuffer(table_of(one)[0], np.int64) for one in each])
+    for number, more in enumerate((0.0, 2.0)):
+        found = compose(takes, {})(Stacked(words, each[0]), number, 2)
+        assert found == pytest.approx(reads(plain, 2) + 1.0 + more)
+        assert each[number].counts[2] == plain.counts[2] + 1
 
 
 @pytest.mark.parametrize("function", [reads, writes, sizes])

@@ -5,13 +5,13 @@ begins in the arrays of the one before, which are set to zero, and in the record
 counters of its own. What becomes of a replicate does not depend on those around it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
 
-from flocsim.compiler.by_pointer import Stacked, address_of, table_and_kinds
+from flocsim.compiler.by_pointer import Stacked, address_of
 from flocsim.compiler.linker import apart
 from flocsim.ensembles.collision.draw import (
     FAILURES,
@@ -19,12 +19,15 @@ from flocsim.ensembles.collision.draw import (
     failed_row,
 )
 from flocsim.ensembles.collision.encounter import Encounter
-from flocsim.ensembles.collision.outcomes import OBSERVER
+from flocsim.ensembles.collision.outcomes import BODY_I, BODY_J, OBSERVER
+from flocsim.ensembles.collision.start import Start, place_of
 from flocsim.ensembles.kind import ROW
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, PAUSED, STOPPED, advance
+from flocsim.integrators.rhs.error import outline_size
 from flocsim.io.results.schema import FAILED
-from flocsim.run import STEPS_AT_A_TIME, UNABLE, extended, force_to_blame, stated_error
+from flocsim.run import STEPS_AT_A_TIME, UNABLE, extended, force_to_blame, within_reach
+from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.clock import Clock, Counts
 from flocsim.state.declared import block_of
 from flocsim.state.records import Record
@@ -41,16 +44,20 @@ class Replicate(NamedTuple):
     counts: Counts
 
 
+class End(Record):
+    """How a replicate has ended."""
+
+    status: int  # of its run: flocsim.integrators.base
+    first_speed: float  # largest speed of an outline at the start [m/s]
+    last_speed: float  # and at the end
+
+
 class Progress(Record):
     """How far a batch is."""
 
     at: int  # number of the replicate at hand
     begun: int  # 1 if that has begun
     steps_left: int  # after so many steps the batch pauses
-
-
-PLACE, VELOCITY = range(2)
-"""What a motion has of each body."""
 
 
 @apart
@@ -61,23 +68,25 @@ def clear(block):
         block[word] = 0
 
 
-def put_motion(work, motion, replicate):
+def put_start(scene, work, start):
     """Place the bodies where a replicate begins."""
-    for body in range(motion.shape[2]):
-        for axis in range(3):
-            work.place[NOW, body, axis] = motion[replicate, PLACE, body, axis]
-            work.velocity[NOW, body, axis] = motion[replicate, VELOCITY, body, axis]
+    place, velocity = work.place, work.velocity
+    place[NOW, BODY_J, X], place[NOW, BODY_J, Y] = place_of(scene, start)
+    place[NOW, BODY_I, ANGLE], place[NOW, BODY_J, ANGLE] = start.angle_i, start.angle_j
+    velocity[NOW, BODY_I, X], velocity[NOW, BODY_J, X] = start.vx_i, start.vx_j
+    velocity[NOW, BODY_I, Y], velocity[NOW, BODY_J, Y] = start.vy_i, start.vy_j
+    velocity[NOW, BODY_I, ANGLE], velocity[NOW, BODY_J, ANGLE] = start.spin_i, start.spin_j
 
 
-def take_motion(work, motion, replicate):
-    """Note where the bodies are as a replicate ends."""
-    for body in range(motion.shape[2]):
-        for axis in range(3):
-            motion[replicate, PLACE, body, axis] = work.place[NOW, body, axis]
-            motion[replicate, VELOCITY, body, axis] = work.velocity[NOW, body, axis]
+def largest_speed(scene, work):
+    """Return the largest speed of an outline [m/s]."""
+    return max(
+        outline_size(scene, work.velocity, NOW, BODY_I),
+        outline_size(scene, work.velocity, NOW, BODY_J),
+    )
 
 
-def run_all(replicates, work, block, motion, statuses, record, progress):
+def run_all(replicates, starts, work, block, ends, record, progress):
     """Run replicates, from the one at hand on, until one ends in another way than by its observer,
     or until the steps are up; return a Status.
 
@@ -85,32 +94,32 @@ def run_all(replicates, work, block, motion, statuses, record, progress):
     ----------
     replicates : Stacked
         A Replicate each.
+    starts : (k,) array of Start
+        Where they begin.
     work, block : Work, int array
         The arrays in which they run, and their memory.
-    motion : (k, 2, 2, 3) array
-        Places and velocities of both bodies, at the start or, of those that have ended, at the end.
-    statuses : (k,) int array
+    ends : (k,) array of End
         Receives how each has ended.
     record : (0, 13) array
         Steps are not recorded.
     progress : Progress
         Where to go on.
     """
-    while progress.at < motion.shape[0]:
+    while progress.at < starts.shape[0]:
         at = progress.at
-        replicate = replicates[at]
+        replicate, end = replicates[at], ends[at]
         if progress.begun == 0:
             clear(block)
             begin(replicate.scene, work, True)
-            put_motion(work, motion, at)
+            put_start(replicate.scene, work, starts[at])
+            end.first_speed = largest_speed(replicate.scene, work)
             progress.begun = 1
         status = advance(
             replicate.scene, work, replicate.observed, replicate.clock, replicate.counts, record
         )
         if status in (NO_ROOM, PAUSED):
             return status
-        take_motion(work, motion, at)
-        statuses[at] = status
+        end.status, end.last_speed = status, largest_speed(replicate.scene, work)
         progress.at, progress.begun = at + 1, 0
         progress.steps_left -= replicate.counts.steps
         if status != STOPPED or progress.steps_left <= 0:
@@ -120,25 +129,6 @@ def run_all(replicates, work, block, motion, statuses, record, progress):
 
 class GivenUp(Exception):
     """The replicates at hand are given up."""
-
-
-class Prepared(NamedTuple):
-    """A Draw that is ready to run, and its number among those that are run with it."""
-
-    number: int
-    draw: Draw
-    table: bytes  # its scene's, and what tells the types in that
-    kinds: Any
-    motion: Any  # at the start
-    until: float  # [s]
-
-
-def prepared(number: int, draw: Draw) -> Prepared:
-    """Return a Draw that is ready to run."""
-    encounter = draw.encounter
-    table, kinds = table_and_kinds(encounter.scene)
-    motion = encounter.places(draw.angles, draw.share)
-    return Prepared(number, draw, table, kinds, motion, encounter.time_limit(draw.share))
 
 
 Whys = dict[int, str | Exception]
@@ -171,16 +161,17 @@ class Batches:
         """
         blank = tuple(failed_row("exception").values())
         rows, whys = np.full(len(draws), np.array(blank, ROW)), Whys()
-        alike: dict[tuple, list[Prepared]] = {}
+        alike: dict[tuple, dict[int, Draw]] = {}
         for number, made in enumerate(draws):
             try:
-                ready = prepared(number, made())
+                draw = made()
+                key = draw.encounter.kind, draw.encounter.table[1]
             except MemoryError:
                 raise
             except Exception as error:
                 whys[number] = error
             else:
-                alike.setdefault((ready.draw.encounter.kind, ready.kinds), []).append(ready)
+                alike.setdefault(key, {})[number] = draw
         groups = list(alike.values())
         while groups:
             group = groups.pop()
@@ -190,37 +181,39 @@ class Batches:
                 raise
             except Exception as error:
                 # Each alone shows which one of them it comes from.
-                groups += [[each] for each in group] if len(group) > 1 else []
-                whys |= {each.number: error for each in group if len(group) == 1}
+                groups += [{number: draw} for number, draw in group.items()] * (len(group) > 1)
+                whys |= dict.fromkeys(group, error) if len(group) == 1 else {}
         return rows, whys
 
     def run_alike(
-        self, group: Sequence[Prepared], max_steps: int, method: Integrator,
+        self, group: Mapping[int, Draw], max_steps: int, method: Integrator,
         halted: Callable[[], bool], rows: np.ndarray, whys: Whys,
     ) -> None:  # fmt: skip
         """Run replicates of the same compiled code; write their rows, and why some have failed."""
-        first, count = group[0].draw.encounter, len(group)
-        key = *first.kind, type(method)
-        driver = self.driver(first, method)
+        numbers, draws, count = list(group), list(group.values()), len(group)
+        pairs = [each.encounter for each in draws]
+        key = *pairs[0].kind, type(method)
+        driver: Any = self.driver(pairs[0], method)
         work: Any = self.arrays.get(key)
-        for each in group:
-            work = fitting(work, each.draw.encounter.scene)
+        for each in pairs:
+            work = fitting(work, each.scene)
         # What each has of its own: rows of arrays.
         clock, counters = method.fresh_clock(), method.fresh_counts(max_steps)
         clocks, counts = Clock.rows(count), Counts.rows(count)
         clocks[:], counts[:] = clock, counters
-        clocks["until"] = [each.until for each in group]
+        clocks["until"] = [each.encounter.time_limit(each.share) for each in draws]
         counts["pause_at"] = STEPS_AT_A_TIME
-        observed = np.array([each.draw.encounter.given for each in group])
-        start = np.array([each.motion for each in group])
-        words = stacked([each.table for each in group], observed, clocks, counts)
-        replicates = Stacked(words, Replicate(first.scene, first.given, clock, counters))
-        motion, statuses = start.copy(), np.zeros(count, np.int64)
+        observed = np.array([each.given for each in pairs])
+        starts, ends = Start.rows(count), End.rows(count)
+        given = [each.encounter.start(each.angles, each.share) for each in draws]
+        for name in Start.dtype.fields or ():
+            starts[name] = [each.get(name, 0.0) for each in given]
+        words = stacked([each.table[0] for each in pairs], observed, clocks, counts)
+        replicates = Stacked(words, Replicate(pairs[0].scene, observed[0], clock, counters))
         progress, record = Progress.one(), np.zeros((0, 13))
         while progress.at < count:
             progress.steps_left = STEPS_AT_A_TIME
-            block = block_of(work)
-            status = driver(replicates, work, block, motion, statuses, record, progress)
+            status = driver(replicates, starts, work, block_of(work), ends, record, progress)
             if status == NO_ROOM:
                 driver, work = extended(driver, work)
                 self.drivers[key], self.arrays[key] = driver, work
@@ -228,16 +221,17 @@ class Batches:
             if progress.begun:
                 counts["pause_at"][progress.at] += STEPS_AT_A_TIME
             elif status in UNABLE:
-                number, draw, *_ = group[progress.at - 1]
-                time = clocks["time"][progress.at - 1]
-                whys[number] = force_to_blame(draw.encounter.system, work, time)
+                last = progress.at - 1
+                system, time = pairs[last].system, clocks["time"][last]
+                whys[numbers[last]] = force_to_blame(system, work, time)
             if progress.at < count and halted():
                 raise GivenUp
         self.arrays[key] = work
-        for k, (number, draw, *_) in enumerate(group):
-            velocities, sizes = (start[k, VELOCITY], motion[k, VELOCITY]), draw.encounter.radii
-            stated = stated_error(clocks["error"][k], *velocities, sizes, clocks["time"][k])
-            row = draw.row(int(statuses[k]), observed[k], clocks[k], counts[k], stated)
+        sizes = [max(shape.bounding_radius for shape in each.shapes) for each in pairs]
+        speeds = np.maximum(ends["first_speed"], ends["last_speed"])
+        errors = within_reach(clocks["error"], speeds, sizes, clocks["time"])
+        for k, (number, draw) in enumerate(group.items()):
+            row = draw.row(int(ends[k].status), observed[k], clocks[k], counts[k], errors[k])
             if whys.get(number):
                 row |= {"outcome": FAILED, "failure": FAILURES.index("not finite")}
             rows[number] = tuple(row.values())

@@ -17,7 +17,8 @@ from flocsim.body import Body
 from flocsim.bonds.certificate import SAFETY
 from flocsim.bonds.escape import BARRIER
 from flocsim.bonds.rest import REST_TURNS
-from flocsim.compiler.by_pointer import keep
+from flocsim.compiler.by_pointer import table_of
+from flocsim.compiler.composer import compiled
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.attraction import (
     attraction_width,
@@ -26,6 +27,7 @@ from flocsim.ensembles.collision.attraction import (
     speeds_of,
 )
 from flocsim.ensembles.collision.draw import orientations
+from flocsim.ensembles.collision.start import Start, place_of
 from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.forces.body_forces import random_key, thermal_forces
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
@@ -45,11 +47,6 @@ each other what spheres are there, and in a flow a strain brings them together b
 
 
 Arrays = tuple[np.ndarray, ...]
-
-Triple = tuple[float, float, float]
-
-Placed = tuple[tuple[Triple, ...], tuple[Triple, ...]]
-"""Places [m, m, rad] and velocities [m/s, m/s, rad/s] of i and j."""
 
 
 @attrs.frozen(eq=False, slots=False)
@@ -118,8 +115,8 @@ class Encounter(abc.ABC):
         """Return the simulated time [s] after which a replicate is undecided, if none is given."""
 
     @abc.abstractmethod
-    def places(self, angles: Sequence[float], share: float) -> Placed:
-        """Return where i and j start: see Draw."""
+    def start(self, angles: Sequence[float], share: float) -> dict[str, float]:
+        """Return {field of a Start: value} of a replicate, 0 for all others: see Draw."""
 
     @functools.cached_property
     def laws(self) -> np.ndarray:
@@ -131,9 +128,12 @@ class Encounter(abc.ABC):
     @functools.cached_property
     def scene(self) -> Scene:
         """The two bodies as arrays for the driver, their laws compiled."""
-        scene = self.system.scene(laws=self.laws, near=True)
-        keep(scene, self)
-        return scene
+        return self.system.scene(laws=self.laws, near=True)
+
+    @functools.cached_property
+    def table(self) -> tuple[bytes, tuple[Any, ...]]:
+        """The scene as compiled code is given it, and its types."""
+        return table_of(self.scene)
 
     def keyed(self, *numbers: int) -> "Encounter":
         """Return the same for a replicate whose random forces go by these (seed, replicate)."""
@@ -143,6 +143,7 @@ class Encounter(abc.ABC):
         other = object.__new__(type(self))
         scene = self.scene._replace(key=random_key(*numbers))
         vars(other).update(vars(self), scene=scene, system=self.system.changed(seed=numbers))
+        vars(other).pop("table", None)
         return other
 
     def __getstate__(self) -> dict[str, Any]:
@@ -163,11 +164,6 @@ class Encounter(abc.ABC):
     @functools.cached_property
     def shapes(self) -> tuple[Shape, ...]:
         return tuple(body.shape for body in self.system.bodies)
-
-    @functools.cached_property
-    def radii(self) -> np.ndarray:
-        """R_i and R_j [m]."""
-        return np.array([shape.bounding_radius for shape in self.shapes])
 
     @functools.cached_property
     def described(self) -> dict[str, float]:
@@ -300,5 +296,8 @@ class Encounter(abc.ABC):
 
     def motion(self, angles: Sequence[float], share: float) -> Motion:
         """Return positions and velocities (2, 3) at the start of a replicate: see Draw."""
-        place, velocity = self.places(angles, share)
-        return np.array(place), np.array(velocity)
+        start = Start.one(**self.start(angles, share))
+        x, y = compiled(place_of)(self.scene, start)
+        turning = start.vx_i, start.vy_i, start.spin_i, start.vx_j, start.vy_j, start.spin_j
+        place = np.array([[0.0, 0.0, start.angle_i], [x, y, start.angle_j]])
+        return place, np.array(turning).reshape(2, 3)

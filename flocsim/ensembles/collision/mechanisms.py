@@ -29,10 +29,9 @@ import attrs
 import numpy as np
 
 from flocsim.body import Body
-from flocsim.compiler.composer import compiled
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.encounter import LIMIT_TURNS, Arrays, Encounter, Placed
-from flocsim.ensembles.collision.start import half_widths, place_above
+from flocsim.ensembles.collision.encounter import LIMIT_TURNS, Arrays, Encounter
+from flocsim.ensembles.collision.start import half_widths
 from flocsim.ensembles.collision.turning import angles_by_turning, turning_rates
 from flocsim.ensembles.config.pair_scene import BROWNIAN, EXTENSION, SETTLING, SHEAR, PairScene
 from flocsim.ensembles.config.schema import Config
@@ -113,27 +112,23 @@ class Settling(Encounter):
     def longest(self, share: float) -> float:
         return self.start_gap / self.speed + LIMIT_TURNS * self.turn_time
 
-    def places(self, angles: Sequence[float], share: float) -> Placed:
-        far = (*self.extents, share * self.bent, self.start_gap, self.clear)
-        x, y = compiled(place_above)(self.scene, *angles, *far)
-        return ((0.0, 0.0, angles[0]), (x, y, angles[1])), self.falling
+    def start(self, angles: Sequence[float], share: float) -> dict[str, float]:
+        turned = {"angle_i": angles[0], "angle_j": angles[1], "share": share * self.bent}
+        return self.falling | turned
 
     @functools.cached_property
-    def extents(self) -> tuple[float, ...]:
-        """Spheroradii of i and j, R_i + R_j, and δ_max where it is not that of the outlines [m]."""
-        radii = (float(shape.radius) for shape in self.shapes)
-        return *radii, self.outer, self.outer if self.options.delta_max == "radius" else 0.0
-
-    @functools.cached_property
-    def clear(self) -> float:
-        """Least distance of the centroids at the start [m], unless a gap of outlines is given:
-        forces between the centres do not know how thin these are."""
-        return self.size + self.start_gap if isinstance(self.options.start_gap, str) else 0.0
-
-    @functools.cached_property
-    def falling(self) -> tuple[tuple[float, float, float], ...]:
-        """Velocities of i and j at the start [m/s, m/s, rad/s]."""
-        return tuple((float(x), float(y), 0.0) for (x, y), _ in self.settling)
+    def falling(self) -> dict[str, float]:
+        """What all replicates have in common at their start."""
+        (first, second), automatic = self.settling, isinstance(self.options.start_gap, str)
+        return {
+            "vx_i": first[0][0], "vy_i": first[0][1], "vx_j": second[0][0], "vy_j": second[0][1],
+            "gap": self.start_gap,
+            # Forces between the centres do not know how thin the outlines are.
+            "clear": self.size + self.start_gap if automatic else 0.0,
+            "largest": self.outer if self.options.delta_max == "radius" else 0.0,
+            "reach": self.outer,
+            "radius_i": self.shapes[0].radius, "radius_j": self.shapes[1].radius,
+        }  # fmt: skip
 
     @functools.cached_property
     def bent(self) -> float:
@@ -266,13 +261,15 @@ class InFlow(Weightless):
         log, square = bent_in_flow(round(second / first, 9), round(gap, 9))
         return math.exp(log), square * self.size**2
 
-    def places(self, angles: Sequence[float], share: float) -> Placed:
+    def start(self, angles: Sequence[float], share: float) -> dict[str, float]:
         x, y = self.upstream(self.offset_there(share * self.outer), self.far)
         # Both go along with the flow.
         xx, xy, yx, yy = self.system.fluid.gradient
         spin = 0.5 * (yx - xy)
-        place = (0.0, 0.0, angles[0]), (x, y, angles[1])
-        return place, ((0.0, 0.0, spin), (xx * x + xy * y, yx * x + yy * y, spin))
+        return {
+            "angle_i": angles[0], "angle_j": angles[1], "x": x, "y": y, "spin_i": spin,
+            "vx_j": xx * x + xy * y, "vy_j": yx * x + yy * y, "spin_j": spin,
+        }  # fmt: skip
 
     def bounds(self, angles_i: np.ndarray, angles_j: np.ndarray) -> Arrays:
         largest = np.full(len(angles_i), self.outer + self.reach)
@@ -383,10 +380,10 @@ class Brownian(Weightless):
     def longest(self, share: float) -> float:
         return LIMIT_ESCAPES * self.ends[1] ** 2 / self.diffusion
 
-    def places(self, angles: Sequence[float], share: float) -> Placed:
+    def start(self, angles: Sequence[float], share: float) -> dict[str, float]:
         far, turn = self.ends[0], 2.0 * math.pi * share
-        apart = far * math.cos(turn), far * math.sin(turn)
-        return ((0.0, 0.0, angles[0]), (*apart, angles[1])), ((0.0, 0.0, 0.0),) * 2
+        apart = {"x": far * math.cos(turn), "y": far * math.sin(turn)}
+        return {"angle_i": angles[0], "angle_j": angles[1]} | apart
 
 
 MECHANISMS: dict[str, type[Encounter]] = {

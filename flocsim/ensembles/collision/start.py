@@ -17,6 +17,7 @@ from flocsim.errors import ZoneError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.base import Force
 from flocsim.geometry.shapes.shape import Shape
+from flocsim.state.records import Record
 
 LARGEST_RATIO = 4.0 / math.e**2
 """S above which attraction wins at every distance."""
@@ -105,34 +106,47 @@ def start_height(bodies, angle_i, angle_j, contact, reach, displacement, gap):
     return highest if highest > -clear else clear
 
 
-def place_above(
-    bodies, angle_i, angle_j, radius_i, radius_j, reach, largest, share, gap, clear
-):  # fmt: skip
-    """Return where j's centroid starts from i's, (x, y) [m]: above it, and displaced sideways.
+class Start(Record):
+    """Where a replicate begins: i at the origin, j beside it."""
+
+    angle_i: float  # orientations [rad]
+    angle_j: float
+    x: float  # of j's centroid from i's [m]; of a pair that settles both follow from what is below
+    y: float
+    vx_i: float  # velocities [m/s] and spins [rad/s]
+    vy_i: float
+    spin_i: float
+    vx_j: float
+    vy_j: float
+    spin_j: float
+    gap: float  # distance of the outlines as j comes straight down [m]; 0: the pair does not settle
+    share: float  # displacement of j over δ_max
+    largest: float  # δ_max [m]; 0: that at which the outlines just graze
+    clear: float  # least distance of the centroids [m]; 0: any
+    reach: float  # R_i + R_j [m]
+    radius_i: float  # spheroradii [m]
+    radius_j: float
+
+
+def place_of(bodies, start):
+    """Return where j's centroid starts from i's, (x, y) [m].
 
     Parameters
     ----------
     bodies : Scene or Outlines
         Those of i and j.
-    angle_i, angle_j, radius_i, radius_j : float
-        Orientations [rad] and spheroradii [m].
-    reach : float
-        R_i + R_j [m].
-    largest : float
-        δ_max [m]; 0: that at which the outlines just graze.
-    share : float
-        The displacement over δ_max.
-    gap : float
-        Distance of the outlines as j comes straight down [m].
-    clear : float
-        Least distance of the centroids [m]; 0: any.
+    start : Start
+        What is given.
     """
+    if start.gap == 0.0:
+        return start.x, start.y
+    angle_i, angle_j, largest = start.angle_i, start.angle_j, start.largest
     if largest == 0.0:
-        largest = grazing_offset(bodies, angle_i, angle_j, radius_i, radius_j)
-    x, contact = share * largest, radius_i + radius_j
-    y = start_height(bodies, angle_i, angle_j, contact, reach, x, gap)
-    if abs(x) < clear:
-        y = max(y, math.sqrt(clear * clear - x * x))
+        largest = grazing_offset(bodies, angle_i, angle_j, start.radius_i, start.radius_j)
+    x, contact = start.share * largest, start.radius_i + start.radius_j
+    y = start_height(bodies, angle_i, angle_j, contact, start.reach, x, start.gap)
+    if abs(x) < start.clear:
+        y = max(y, math.sqrt(start.clear * start.clear - x * x))
     return x, y
 
 
