@@ -275,9 +275,9 @@ class Study(StudyKind):
         rows, whys = run(range(len(replicates)), steps, usual)
         # Those without an outcome, once more.
         attempts = [self.second_attempt(row) for row in rows]
-        for attempt in filter(None, set(attempts)):
-            again = [k for k, each in enumerate(attempts) if each == attempt]
-            for k, row in zip(again, run(again, *attempt)[0], strict=True):
+        for method in (usual, *(self.exact or ())[:1]):
+            again = [k for k, each in enumerate(attempts) if each and each[1] is method]
+            for k, row in zip(again, run(again, MORE_STEPS * steps, method)[0], strict=True):
                 if says_outcome(row):
                     rows[k] = row
                     whys.pop(k, None)
@@ -344,25 +344,24 @@ class Study(StudyKind):
         """
         name, vertices, share = condition
         place = [each.name for each in self.pairings].index(name), vertices, share
-        replicates = range(first, min(first + self.at_a_time, stop))
+        replicates = range(first, min(first + min(self.at_a_time, MOST_AT_A_TIME), stop))
         began = time.monotonic()
-        if (found := self.run_all(place, replicates, halted)) is None:
+        try:
+            rows, whys = self.run_all(place, replicates, halted)
+        except GivenUp:
             return np.zeros(0, self.row), []
-        lasted = max(time.monotonic() - began, 1e-9) / len(replicates)
-        self.at_a_time = max(
-            1, min(int(BATCH_SECONDS / lasted), 2 * len(replicates), MOST_AT_A_TIME)
-        )
-        rows, whys = found
+        each = (time.monotonic() - began) / len(replicates)
+        self.at_a_time = min(max(int(BATCH_SECONDS / each), 1), 2 * len(replicates))
         notes = []
-        for number in np.flatnonzero(self.has_failed(rows.__getitem__)).tolist():
-            why, reason = whys.get(number, ""), FAILURES[rows["failure"][number]]
+        for k in np.flatnonzero(self.has_failed(rows.__getitem__)).tolist():
+            why = whys.get(k, "")
             if isinstance(why, Exception):
-                drawn = orientations(self.numbers(replicates[number]))
-                rows["angle_i"][number], rows["angle_j"][number] = drawn
+                drawn = orientations(self.numbers(replicates[k]))
+                rows["angle_i"][k], rows["angle_j"][k] = drawn
                 text = f"{type(why).__name__}: {' '.join(str(why).split())}"[:LONGEST_REASON]
             else:
-                text = reason + (f": {why}" if why else "")
-            notes.append(self.note(condition, replicates[number], text))
+                text = FAILURES[rows["failure"][k]] + (f": {why}" if why else "")
+            notes.append(self.note(condition, replicates[k], text))
         return rows, notes
 
     def run_task(

@@ -294,11 +294,11 @@ def slow_down(seconds):
     """Let a replicate take some time more."""
     for study in (Study, SwarmStudy):
 
-        def run_task(*words, original=study.run_task, **more):
+        def run_some(*words, original=study.run_some, **more):
             time.sleep(seconds)
             return original(*words, **more)
 
-        study.run_task = run_task
+        study.run_some = run_some
 
 
 def state_of(pid):

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from flocsim.ensembles import study
 from flocsim.ensembles.kind import ROW, Condition
 from flocsim.ensembles.parallel import coordinator
 from flocsim.ensembles.parallel.communicator import ChunkResult
@@ -32,6 +33,7 @@ def after_chunks(number, happen=StudyState.interrupt):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(coordinator, "chunk_seconds", lambda size: 1e-9)
+        patch.setattr(study, "MOST_AT_A_TIME", 1)
         patch.setattr(StudyState, "take_in", take_in)
         yield
 

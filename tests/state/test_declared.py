@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from flocsim.state.declared import clear, enlarged, zeros_of
+from flocsim.state.declared import block_of, enlarged, zeros_of
 from flocsim.state.records import Record
 
 
@@ -52,10 +52,10 @@ def test_arrays_are_as_declared_and_aligned():
         assert each.flags.c_contiguous and each.flags.aligned
 
 
-def test_all_is_cleared_but_for_what_has_been_put_in_its_place():
+def test_all_is_in_one_block_but_for_what_has_been_put_in_its_place():
     made = filled()
     other = np.ones(3)
-    clear(made._replace(places=other))
+    block_of(made._replace(places=other))[:] = 0
     assert not made.numbers.any() and not made.inner.flags.any()
     assert made.places[1, 0].index == 0 and made.inner.best.x == 0.0
     assert other.all()

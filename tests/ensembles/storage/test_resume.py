@@ -261,15 +261,15 @@ def test_a_results_file_tells_of_all_runs_that_it_took(tmp_path, whole):
 @contextlib.contextmanager
 def failing(*replicates):
     """Let these replicates raise."""
-    original = Study.run
+    original = Study.draw
 
-    def run(study, condition, vertices, share, replicate, *more):
+    def draw(study, condition, vertices, share, replicate, *more):
         if replicate in replicates:
             raise ZeroDivisionError("in a force of one's own")
         return original(study, condition, vertices, share, replicate, *more)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Study, "run", run)
+        patch.setattr(Study, "draw", draw)
         yield
 
 
