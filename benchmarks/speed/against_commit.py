@@ -3,9 +3,10 @@
     python -m benchmarks.speed.against_commit COMMIT [--quick] [--markdown] [--vertices N]
                                               [--meeting settling | shear] [--preset tang2014 | si]
 
-Both run the same replicates in processes of their own, one group (four displacements, or four
-points of a study of kernels in shear) after the other, each group twice and in both orders; of two
-CPU times the smaller counts. The machine's moods hit both alike then: the median over the groups is
+Both run the same replicates in processes of their own, one group (ten replicates at each of four
+displacements, or forty points of a study of kernels in shear) after the other, in the chunks in
+which a study deals them out, each group twice and in both orders; of two CPU times the smaller
+counts. The machine's moods hit both alike then: the median over the groups is
 steadier than the ratio of sums. Groups are spread over what a study of 240 replicates a condition
 takes more than one of 40: of the first ones far more are run again, to know the numerical error.
 Flocs are those of the library that is shipped, as each tree would fit grown ones in its own way.
@@ -30,29 +31,27 @@ CHILD = """
 import sys, time
 from pathlib import Path
 {made}
-vertices = config.shapes.vertices[0]
 for line in sys.stdin:
-    condition, group = map(int, line.split())
+    kind, first = map(int, line.split())
     began = time.process_time()
-    for share, replicate in group_of(group):
-        study.run(condition, vertices, share, replicate)
+    for chunk in chunks_of(kind, first):
+        assert len(run_chunk(study, chunk, lambda: False, 1e9).rows) == chunk.stop - chunk.first
     print(time.process_time() - began, flush=True)
 """
 """Runs groups of replicates on demand."""
 
 MADE = """\
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.kind import study_of
+from flocsim.ensembles.kind import Chunk, study_of
+from flocsim.ensembles.parallel.coordinator import run_chunk
 
-config = load_any_config(Path(sys.argv[1]))
-study = study_of(config)
+study = study_of(load_any_config(Path(sys.argv[1])))
+shares = len(study.conditions) // len(study.scene.names)
 
 
-def group_of(group):
-    shares = getattr(config.scene, "delta", None)
-    if shares:
-        return [(share, group) for share in shares]
-    return [(1.0, 4 * group + k) for k in range(4)]
+def chunks_of(kind, first):
+    count = 40 // shares
+    return [Chunk(shares * kind + k, first, first + count) for k in range(shares)]
 """
 """How the child makes its study, and what is in a group, with names that the other commit has."""
 
@@ -150,7 +149,7 @@ def main():
         meeting={"choices": list(TYPES), "default": "settling"},
     )  # fmt: skip
     meeting = arguments.meeting
-    groups = 10 if arguments.quick else 60
+    groups = 5 if arguments.quick else 20
     table = Table(
         f"Throughput over that of {arguments.commit}, {arguments.preset}, {meeting}, "
         f"N = {arguments.vertices}",
