@@ -21,6 +21,7 @@ class Stacked(NamedTuple):
     """Tables of one type, one after another, of which compiled code takes any by its number."""
 
     words: np.ndarray  # (tables, words) of int64
+    kinds: tuple[Any, ...]  # the types in each, as table_of gives them
     one: Any  # an argument that has such a table
 
 
@@ -60,8 +61,7 @@ def flatten(value, words, kinds):
     if isinstance(value, Stacked):
         flatten(value.words, words, kinds)
         words.pop()  # the tables alone are counted, as their length is known
-        kinds.append(Stacked)
-        flatten(value.one, [], kinds)
+        kinds += [Stacked, *value.kinds]
     elif isinstance(value, np.ndarray):
         # Sizes are words and not part of the type: arrays of any size share machine code.
         words.append(address_of(value))

@@ -276,8 +276,9 @@ class Study(StudyKind):
         # Those without an outcome, once more.
         attempts = [self.second_attempt(row) for row in rows]
         for method in (usual, *(self.exact or ())[:1]):
-            again = [k for k, each in enumerate(attempts) if each and each[1] is method]
-            for k, row in zip(again, run(again, MORE_STEPS * steps, method)[0], strict=True):
+            again = [k for k, each in enumerate(attempts) if each and each[1] == method]
+            found = run(again, MORE_STEPS * steps, method)[0] if again else ()
+            for k, row in zip(again, found, strict=True):
                 if says_outcome(row):
                     rows[k] = row
                     whys.pop(k, None)

@@ -100,7 +100,7 @@ def test_stacked_tables_are_taken_by_their_numbers():
     each[1].places[:] += 2.0
     words = np.array([np.frombuffer(table_of(one)[0], np.int64) for one in each])
     for number, more in enumerate((0.0, 2.0)):
-        found = compose(takes, {})(Stacked(words, each[0]), number, 2)
+        found = compose(takes, {})(Stacked(words, table_of(plain)[1], each[0]), number, 2)
         assert found == pytest.approx(reads(plain, 2) + 1.0 + more)
         assert each[number].counts[2] == plain.counts[2] + 1
 

@@ -5,13 +5,13 @@ begins in the arrays of the one before, which are set to zero, and in the record
 counters of its own. What becomes of a replicate does not depend on those around it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
 
-from flocsim.compiler.by_pointer import Stacked, address_of
+from flocsim.compiler.by_pointer import Stacked, address_of, table_of
 from flocsim.compiler.linker import apart
 from flocsim.ensembles.collision.draw import (
     FAILURES,
@@ -36,9 +36,10 @@ from flocsim.state.work import NOW, Work, begin, fitting
 
 
 class Replicate(NamedTuple):
-    """What a replicate has of its own."""
+    """What the loop is given of a replicate."""
 
     scene: Scene
+    work: Work  # in which all of them run
     observed: np.ndarray  # the observer's array: flocsim.ensembles.collision.outcomes
     clock: Clock
     counts: Counts
@@ -86,7 +87,7 @@ def largest_speed(scene, work):
     )
 
 
-def run_all(replicates, starts, work, block, ends, record, progress):
+def run_all(replicates, starts, block, ends, record, progress):
     """Run replicates, from the one at hand on, until one ends in another way than by its observer,
     or until the steps are up; return a Status.
 
@@ -96,8 +97,8 @@ def run_all(replicates, starts, work, block, ends, record, progress):
         A Replicate each.
     starts : (k,) array of Start
         Where they begin.
-    work, block : Work, int array
-        The arrays in which they run, and their memory.
+    block : int array
+        The memory of their work arrays.
     ends : (k,) array of End
         Receives how each has ended.
     record : (0, 13) array
@@ -108,6 +109,7 @@ def run_all(replicates, starts, work, block, ends, record, progress):
     while progress.at < starts.shape[0]:
         at = progress.at
         replicate, end = replicates[at], ends[at]
+        work = replicate.work
         if progress.begun == 0:
             clear(block)
             begin(replicate.scene, work, True)
@@ -135,12 +137,29 @@ Whys = dict[int, str | Exception]
 """{number of a replicate: why it has failed}: an exception, or words on a force."""
 
 
+class Arrays:
+    """Work arrays with their memory and their table."""
+
+    def __init__(self, work: Work) -> None:
+        self.work, self.block, (self.table, self.kinds) = work, block_of(work), table_of(work)
+
+
 @attrs.define(eq=False)
 class Batches:
     """Runs replicates of a study, all those of the same compiled code in the same arrays."""
 
     drivers: dict[tuple, Any] = attrs.field(factory=dict)
-    arrays: dict[tuple, Work] = attrs.field(factory=dict)
+    arrays: dict[tuple, Arrays] = attrs.field(factory=dict)
+
+    def arrays_for(self, key: tuple, scenes: Iterable[Scene]) -> Arrays:
+        """Return those with room for all of some scenes."""
+        known = self.arrays.get(key)
+        work: Any = known.work if known else None
+        for scene in scenes:
+            work = fitting(work, scene)
+        if known is None or work is not known.work:
+            self.arrays[key] = Arrays(work)
+        return self.arrays[key]
 
     def driver(self, encounter: Encounter, method: Integrator) -> Any:
         """Return the compiled `run_all` of such pairs and a method."""
@@ -194,9 +213,6 @@ class Batches:
         pairs = [each.encounter for each in draws]
         key = *pairs[0].kind, type(method)
         driver: Any = self.driver(pairs[0], method)
-        work: Any = self.arrays.get(key)
-        for each in pairs:
-            work = fitting(work, each.scene)
         # What each has of its own: rows of arrays.
         clock, counters = method.fresh_clock(), method.fresh_counts(max_steps)
         clocks, counts = Clock.rows(count), Counts.rows(count)
@@ -208,25 +224,29 @@ class Batches:
         given = [each.encounter.start(each.angles, each.share) for each in draws]
         for name in Start.dtype.fields or ():
             starts[name] = [each.get(name, 0.0) for each in given]
-        words = stacked([each.table[0] for each in pairs], observed, clocks, counts)
-        replicates = Stacked(words, Replicate(pairs[0].scene, observed[0], clock, counters))
         progress, record = Progress.one(), np.zeros((0, 13))
+        arrays = None
         while progress.at < count:
+            if arrays is None:
+                arrays = self.arrays_for(key, [each.scene for each in pairs])
+                one = Replicate(pairs[0].scene, arrays.work, observed[0], clock, counters)
+                kinds = (Replicate, *pairs[0].table[1], *arrays.kinds, *table_of(one[2:])[1])
+                tables = [each.table[0] + arrays.table for each in pairs]
+                replicates = Stacked(stacked(tables, observed, clocks, counts), kinds, one)
             progress.steps_left = STEPS_AT_A_TIME
-            status = driver(replicates, starts, work, block_of(work), ends, record, progress)
+            status = driver(replicates, starts, arrays.block, ends, record, progress)
             if status == NO_ROOM:
-                driver, work = extended(driver, work)
-                self.drivers[key], self.arrays[key] = driver, work
+                driver, work = extended(driver, arrays.work)
+                self.drivers[key], self.arrays[key], arrays = driver, Arrays(work), None
                 continue
             if progress.begun:
                 counts["pause_at"][progress.at] += STEPS_AT_A_TIME
             elif status in UNABLE:
                 last = progress.at - 1
                 system, time = pairs[last].system, clocks["time"][last]
-                whys[numbers[last]] = force_to_blame(system, work, time)
+                whys[numbers[last]] = force_to_blame(system, arrays.work, time)
             if progress.at < count and halted():
                 raise GivenUp
-        self.arrays[key] = work
         sizes = [max(shape.bounding_radius for shape in each.shapes) for each in pairs]
         speeds = np.maximum(ends["first_speed"], ends["last_speed"])
         errors = within_reach(clocks["error"], speeds, sizes, clocks["time"])
