@@ -252,30 +252,14 @@ def solve_series(scene, work, clock, step, known):
     return 0
 
 
-def decay_of_remainder(work):
-    """Return how far the coefficients of R fall from the second to the third, 1 at most, by the
-    displacements that they lead to."""
-    second = third = 0.0
-    for body in range(work.place.shape[1]):
-        for axis in range(3):
-            weight = work.weights[MOVED, body, axis] * work.weights[LEVER, body, axis]
-            second = max(second, weight * abs(work.remainder[MOTION, 2, body, axis]))
-            third = max(third, weight * abs(work.remainder[MOTION, 3, body, axis]))
-    return third / second if third < second else 1.0
-
-
 def write_estimate(work, step, goal):
-    """Write the estimated error to STEP_ERROR, to ``goal`` [m]: the effect of leaving out the
-    second Lobatto point, times the decay of R.
-
-    Where coefficients fall by a factor q from one to the next, the true error is .013 q³ of that
-    effect (Lobatto's quadrature). So the estimate is still pessimistic, and of order 5.
-    """
-    remainder, decay = work.remainder, decay_of_remainder(work)
+    """Write the effect of leaving out the second Lobatto point to STEP_ERROR: the embedded
+    estimate, to ``goal`` [m]."""
+    remainder = work.remainder
     for body in range(work.place.shape[1]):
         for axis in range(3):
             # Cubic minus parabola without that point: r₃ θ (θ − c₁)(θ − 1).
-            cubic = decay * remainder[MOTION, 3, body, axis]
+            cubic = remainder[MOTION, 3, body, axis]
             remainder[CHANGED, 1, body, axis] = NODES[0] * cubic
             remainder[CHANGED, 2, body, axis] = -(1.0 + NODES[0]) * cubic
             remainder[CHANGED, 3, body, axis] = cubic

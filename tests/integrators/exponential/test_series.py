@@ -14,11 +14,10 @@ from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import attempt
 from flocsim.integrators import Implicit
 from flocsim.integrators.events.first_event import set_modes
-from flocsim.integrators.exponential.collocation import decay_of_remainder
 from flocsim.integrators.loop.driver import adopt_new_state
 from flocsim.integrators.loop.stated_error import propagate_vector
 from flocsim.state.bodies import ANGLE, X
-from flocsim.state.work import DAMPING, MOTION, NEW, NOW, PROPAGATED, STEP_ERROR, motion_of, work_of
+from flocsim.state.work import DAMPING, NEW, NOW, PROPAGATED, STEP_ERROR, motion_of, work_of
 from tests.helpers.trial_scenes import Trap
 
 R = 5e-6
@@ -151,15 +150,3 @@ def test_an_error_grows_as_an_attraction_gets_steeper():
     assert true > 30.0 * nudge
     assert work.place[PROPAGATED, 0, X] == pytest.approx(true, rel=0.2)
     assert work.errors[0].displacement > 5.0 * true
-
-
-def test_the_estimate_counts_less_where_the_remainder_is_smooth():
-    step = Linked(trapped())
-    step.step(0.1 / RATE)
-    remainder, weights = step.work.remainder, step.work.weights
-    remainder[:], weights[:] = 0.0, 1.0
-    for third, decay in ((0.25, 0.25), (-0.5, 0.5), (1.0, 1.0), (3.0, 1.0)):
-        remainder[MOTION, 2, 0, X], remainder[MOTION, 3, 0, X] = 1.0, third
-        assert decay_of_remainder(step.work) == decay
-    remainder[:] = 0.0
-    assert decay_of_remainder(step.work) == 1.0
