@@ -3,8 +3,8 @@
     python -m benchmarks.speed.against_commit COMMIT [--quick] [--markdown] [--vertices N]
                                               [--meeting settling | shear] [--preset tang2014 | si]
 
-Both run the same replicates in processes of their own, one group (ten replicates at each of four
-displacements, or forty points of a study of kernels in shear) after the other, in the chunks in
+Both run the same replicates in processes of their own, one group (forty replicates at each of four
+displacements, or 160 points of a study of kernels in shear) after the other, in the chunks in
 which a study deals them out, each group twice and in both orders; of two CPU times the smaller
 counts. The machine's moods hit both alike then: the median over the groups is
 steadier than the ratio of sums. Groups are spread over what a study of 240 replicates a condition
@@ -50,7 +50,7 @@ shares = len(study.conditions) // len(study.scene.names)
 
 
 def chunks_of(kind, first):
-    count = 40 // shares
+    count = 160 // shares
     return [Chunk(shares * kind + k, first, first + count) for k in range(shares)]
 """
 """How the child makes its study, and what is in a group, with names that the other commit has."""
