@@ -31,7 +31,7 @@ from flocsim.integrators.amplification import amplification_of
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.left_out import left_out
-from flocsim.integrators.loop.driver import advance
+from flocsim.integrators.loop.driver import drive
 from flocsim.plausibility import plausibility_warnings
 from flocsim.run import UNABLE, Run, force_to_blame
 from flocsim.state.scene import NO_OUTLINES, Scene
@@ -266,7 +266,7 @@ class System:
         return compiled_calls(self.pieces.plain_bodies)
 
     def compose(
-        self, entry: Callable = advance, observer: Fillings | None = None, *, jit: bool = True
+        self, entry: Callable = drive, observer: Fillings | None = None, *, jit: bool = True
     ) -> Callable:
         """Return the driver of this family of scenes as one function, compiled unless
         ``jit=False``."""
