@@ -18,7 +18,7 @@ from flocsim.errors import KernelError
 
 
 class Stacked(NamedTuple):
-    """Tables of one type, one after another, of which compiled code takes any by its number."""
+    """Tables of one type, which compiled code takes by an index."""
 
     words: np.ndarray  # (tables, words) of int64
     kinds: tuple[Any, ...]  # the types in each, as table_of gives them

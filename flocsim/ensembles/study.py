@@ -15,7 +15,7 @@ import numpy as np
 
 from flocsim.compiler.composer import is_on_disk
 from flocsim.compiler.fingerprint import fingerprint
-from flocsim.ensembles.collision.batch import Batches, GivenUp, Whys
+from flocsim.ensembles.collision.batch import Batches, Halted, Reasons
 from flocsim.ensembles.collision.draw import (
     FAILED,
     FAILURES,
@@ -46,7 +46,7 @@ from flocsim.ensembles.config.schema import BAND, CUT, Config
 from flocsim.ensembles.diagnose.preflight import check_study, study_warnings
 from flocsim.ensembles.kind import COLUMNS, Code, Condition, Going, Keep, StudyKind
 from flocsim.integrators.base import Integrator
-from flocsim.integrators.loop.driver import advance
+from flocsim.integrators.loop.driver import advance, drive
 from flocsim.io.results.events import flips_easily
 from flocsim.io.results.schema import BAND_ENDS, FURTHER_RUNS, OUTCOMES, RADII, UNKNOWN
 
@@ -56,6 +56,11 @@ TRIED_AGAIN = ("step budget", "stalled", "too deep", "not finite")
 
 BATCH_SECONDS, MOST_AT_A_TIME = 0.1, 256
 """Time for which replicates run before their rows are handed in, and most of them."""
+
+
+def as_dict(row: np.void) -> dict[str, Any]:
+    """Return {column: value} of a row."""
+    return dict(zip(COLUMNS, row.tolist(), strict=True))
 
 
 def says_outcome(row: Any) -> bool:
@@ -83,7 +88,6 @@ class Study(StudyKind):
     pools: dict[str, FlocPool] = attrs.field(init=False)
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
     first: dict[str, Encounter] = attrs.field(init=False, factory=dict)
-    drivers: dict[tuple, Callable] = attrs.field(init=False, factory=dict)
     batches: Batches = attrs.field(init=False, factory=Batches)
     at_a_time: int = attrs.field(init=False, default=4)
     exact: tuple[Integrator, Integrator] | None = attrs.field(init=False)
@@ -232,17 +236,11 @@ class Study(StudyKind):
         )  # fmt: skip
 
     def driver(self, encounter: Encounter, method: Integrator | None = None) -> Callable:
-        """The compiled driver of an encounter: one for spheres, one for polygons, of a method.
+        """Return the compiled driver of one run at a time: for spheres or polygons, and a method.
 
         ``method``: another one than the encounter's.
         """
-        system = encounter.system
-        method = method or system.integrator
-        kind = *encounter.kind, type(method)
-        if kind not in self.drivers:
-            made = system.changed(integrator=method)
-            self.drivers[kind] = made.compose(observer=OBSERVER)
-        return self.drivers[kind]
+        return self.batches.driver(encounter, method or encounter.system.integrator, drive)
 
     def run(
         self, condition: int, vertices: int, share: float, replicate: int,
@@ -253,26 +251,47 @@ class Study(StudyKind):
         Return its row; None where ``halted()``, looked at now and then, gives it up.
         """
         try:
-            rows, whys = self.run_all((condition, vertices, share), [replicate], halted)
-        except GivenUp:
+            rows, reasons = self.run_all((condition, vertices, share), [replicate], halted)
+        except Halted:
             return None
-        if isinstance(why := whys.get(0), Exception):
+        if isinstance(why := reasons.get(0), Exception):
             raise why
-        return dict(zip(COLUMNS, rows[0].tolist(), strict=True))
+        return as_dict(rows[0])
 
     def run_all(
-        self, place: tuple[int, int, float], replicates: Sequence[int],
+        self, condition: tuple[int, int, float], replicates: Sequence[int],
         halted: Callable[[], bool] = lambda: False,
-    ) -> tuple[np.ndarray, Whys]:  # fmt: skip
-        """Run replicates of a condition and those of their further runs that are due; return their
-        rows and why some have failed, by their places. GivenUp where ``halted()`` says so."""
+    ) -> tuple[np.ndarray, Reasons]:  # fmt: skip
+        """Run replicates of a condition, with the further runs that are due.
+
+        Parameters
+        ----------
+        condition : (int, int, float)
+            Index of the collision type, number of vertices, share of δ_max.
+        replicates : sequence of int
+            Their indices in the condition.
+        halted : callable, optional
+            Asked now and then; True ends the runs.
+
+        Returns
+        -------
+        rows : (k,) array of ROW
+            A row for each replicate.
+        reasons : dict
+            Why some of them failed, by their positions.
+
+        Raises
+        ------
+        Halted
+            If ``halted()`` has returned True.
+        """
         steps, usual = self.config.integrator.max_steps, self.config.integrator.method
 
-        def run(places: Iterable[int], most: int, method: Integrator, end: str = CUT) -> Any:
-            draws = [partial(self.draw, *place, replicates[each], end) for each in places]
+        def run(indices: Iterable[int], most: int, method: Integrator, end: str = CUT) -> Any:
+            draws = [partial(self.draw, *condition, replicates[each], end) for each in indices]
             return self.batches.run(draws, most, method, halted)
 
-        rows, whys = run(range(len(replicates)), steps, usual)
+        rows, reasons = run(range(len(replicates)), steps, usual)
         # Those without an outcome, once more.
         attempts = [self.second_attempt(row) for row in rows]
         for method in (usual, *(self.exact or ())[:1]):
@@ -281,17 +300,17 @@ class Study(StudyKind):
             for k, row in zip(again, found, strict=True):
                 if says_outcome(row):
                     rows[k] = row
-                    whys.pop(k, None)
+                    reasons.pop(k, None)
 
-        def note(name: str, places: list[int], *how: Any) -> None:
+        def note(name: str, indices: list[int], *how: Any) -> None:
             """Run some as ``how`` says, and write what comes of it into columns of that name."""
             # Spheres of a given size have no outline to cut.
-            same = name in BAND_ENDS and place[1] == 1 and not self.floc_pool.own_size
-            found = rows[places] if same else run(places, *how)[0]
+            same = name in BAND_ENDS and condition[1] == 1 and not self.floc_pool.own_size
+            found = rows[indices] if same else run(indices, *how)[0]
             for column, of in columns_of(name).items():
-                rows[column][places] = found[of]
+                rows[column][indices] = found[of]
 
-        whole = [k for k in range(len(rows)) if not isinstance(whys.get(k), Exception)]
+        whole = [k for k in range(len(rows)) if not isinstance(reasons.get(k), Exception)]
         for end in BAND_ENDS if self.is_banded else ():
             note(end, whole, MORE_STEPS * steps, usual, end)
         if self.exact is not None:
@@ -299,7 +318,7 @@ class Study(StudyKind):
             for turn, (method, name) in enumerate(zip(self.exact, FURTHER_RUNS[:2], strict=True)):
                 steps *= MORE_STEPS
                 note(name, [k for k in whole if wanted[k] > turn], steps, method)
-        return rows, whys
+        return rows, reasons
 
     def further_runs(self, replicate: int, row: np.void) -> int:
         """Return how often a replicate with such a row is run again, more exactly."""
@@ -348,14 +367,14 @@ class Study(StudyKind):
         replicates = range(first, min(first + min(self.at_a_time, MOST_AT_A_TIME), stop))
         began = time.monotonic()
         try:
-            rows, whys = self.run_all(place, replicates, halted)
-        except GivenUp:
+            rows, reasons = self.run_all(place, replicates, halted)
+        except Halted:
             return np.zeros(0, self.row), []
         each = (time.monotonic() - began) / len(replicates)
         self.at_a_time = min(max(int(BATCH_SECONDS / each), 1), 2 * len(replicates))
         notes = []
         for k in np.flatnonzero(self.has_failed(rows.__getitem__)).tolist():
-            why = whys.get(k, "")
+            why = reasons.get(k, "")
             if isinstance(why, Exception):
                 drawn = orientations(self.numbers(replicates[k]))
                 rows["angle_i"][k], rows["angle_j"][k] = drawn
@@ -371,7 +390,7 @@ class Study(StudyKind):
     ) -> tuple[dict | None, dict | None]:  # fmt: skip
         """Run one replicate."""
         rows, notes = self.run_some(condition, replicate, replicate + 1, halted)
-        row = dict(zip(COLUMNS, rows[0].tolist(), strict=True)) if len(rows) else None
+        row = as_dict(rows[0]) if len(rows) else None
         return row, next(iter(notes), None)
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:

@@ -121,6 +121,7 @@ class Work(NamedTuple):
     place: Annotated[np.ndarray, (ALL_STATES, "n", 3)]  # positions, angles in all states [m, rad]
     velocity: Annotated[np.ndarray, (ALL_STATES, "n", 3)]  # velocities and spins [m/s, rad/s]
     force: Annotated[np.ndarray, (STATES, "n", 3)]  # forces and torques [N, N m]
+    # Three coordinates and a 0 for each body: see exponential.series.write_term.
     series: Annotated[np.ndarray, (2, TERMS, "few", 4)]  # terms of a motion, see MOTION [m, rad]
     remainder: Annotated[np.ndarray, (2, 4, "few", 4)]  # R₀, r₁, r₂, r₃ of its force [N, N m]
     weights: Annotated[np.ndarray, (2, "few", 4)]  # see MOVED

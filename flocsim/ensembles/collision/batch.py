@@ -13,11 +13,7 @@ import numpy as np
 
 from flocsim.compiler.by_pointer import Stacked, address_of, table_of
 from flocsim.compiler.linker import apart
-from flocsim.ensembles.collision.draw import (
-    FAILURES,
-    Draw,
-    failed_row,
-)
+from flocsim.ensembles.collision.draw import BLANK, Draw, failed
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.outcomes import BODY_I, BODY_J, OBSERVER
 from flocsim.ensembles.collision.start import Start, place_of
@@ -25,7 +21,6 @@ from flocsim.ensembles.kind import ROW
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, PAUSED, STOPPED, advance
 from flocsim.integrators.rhs.error import outline_size
-from flocsim.io.results.schema import FAILED
 from flocsim.run import STEPS_AT_A_TIME, UNABLE, extended, force_to_blame, within_reach
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.clock import Clock, Counts
@@ -129,12 +124,12 @@ def run_all(replicates, starts, block, ends, record, progress):
     return FINISHED
 
 
-class GivenUp(Exception):
-    """The replicates at hand are given up."""
+class Halted(Exception):
+    """Raised where replicates are halted before they have ended."""
 
 
-Whys = dict[int, str | Exception]
-"""{number of a replicate: why it has failed}: an exception, or words on a force."""
+Reasons = dict[int, str | Exception]
+"""{index of a replicate: why it failed}: an exception, or the force to blame in words."""
 
 
 class Arrays:
@@ -161,25 +156,25 @@ class Batches:
             self.arrays[key] = Arrays(work)
         return self.arrays[key]
 
-    def driver(self, encounter: Encounter, method: Integrator) -> Any:
-        """Return the compiled `run_all` of such pairs and a method."""
-        key = *encounter.kind, type(method)
+    def driver(self, encounter: Encounter, method: Integrator, entry: Callable = run_all) -> Any:
+        """Return the engine of such pairs and a method, compiled; ``entry``: where it begins."""
+        key = *encounter.kind, type(method), entry
         if key not in self.drivers:
             system = encounter.system.changed(integrator=method)
-            self.drivers[key] = system.compose(run_all, OBSERVER)
+            self.drivers[key] = system.compose(entry, OBSERVER)
         return self.drivers[key]
 
     def run(
         self, draws: Sequence[Callable[[], Draw]], max_steps: int, method: Integrator,
         halted: Callable[[], bool] = lambda: False,
-    ) -> tuple[np.ndarray, Whys]:  # fmt: skip
+    ) -> tuple[np.ndarray, Reasons]:  # fmt: skip
         """Run replicates, and return their rows and why some have failed.
 
         ``draws`` make a Draw each. An exception costs the replicate alone in which it comes up, but
-        for a lack of memory. Raises GivenUp where ``halted()``, looked at now and then, says so.
+        for a lack of memory. Raises Halted where ``halted()``, looked at now and then, says so.
         """
-        blank = tuple(failed_row("exception").values())
-        rows, whys = np.full(len(draws), np.array(blank, ROW)), Whys()
+        blank = tuple((BLANK | failed("exception")).values())
+        rows, reasons = np.full(len(draws), np.array(blank, ROW)), Reasons()
         alike: dict[tuple, dict[int, Draw]] = {}
         for number, made in enumerate(draws):
             try:
@@ -188,30 +183,30 @@ class Batches:
             except MemoryError:
                 raise
             except Exception as error:
-                whys[number] = error
+                reasons[number] = error
             else:
                 alike.setdefault(key, {})[number] = draw
         groups = list(alike.values())
         while groups:
             group = groups.pop()
             try:
-                self.run_alike(group, max_steps, method, halted, rows, whys)
-            except (MemoryError, GivenUp):
+                self.run_alike(group, max_steps, method, halted, rows, reasons)
+            except (MemoryError, Halted):
                 raise
             except Exception as error:
                 # Each alone shows which one of them it comes from.
                 groups += [{number: draw} for number, draw in group.items()] * (len(group) > 1)
-                whys |= dict.fromkeys(group, error) if len(group) == 1 else {}
-        return rows, whys
+                reasons |= dict.fromkeys(group, error) if len(group) == 1 else {}
+        return rows, reasons
 
     def run_alike(
         self, group: Mapping[int, Draw], max_steps: int, method: Integrator,
-        halted: Callable[[], bool], rows: np.ndarray, whys: Whys,
+        halted: Callable[[], bool], rows: np.ndarray, reasons: Reasons,
     ) -> None:  # fmt: skip
         """Run replicates of the same compiled code; write their rows, and why some have failed."""
         numbers, draws, count = list(group), list(group.values()), len(group)
         pairs = [each.encounter for each in draws]
-        key = *pairs[0].kind, type(method)
+        key = *pairs[0].kind, type(method), run_all
         driver: Any = self.driver(pairs[0], method)
         # What each has of its own: rows of arrays.
         clock, counters = method.fresh_clock(), method.fresh_counts(max_steps)
@@ -244,16 +239,16 @@ class Batches:
             elif status in UNABLE:
                 last = progress.at - 1
                 system, time = pairs[last].system, clocks["time"][last]
-                whys[numbers[last]] = force_to_blame(system, arrays.work, time)
+                reasons[numbers[last]] = force_to_blame(system, arrays.work, time)
             if progress.at < count and halted():
-                raise GivenUp
+                raise Halted
         sizes = [max(shape.bounding_radius for shape in each.shapes) for each in pairs]
         speeds = np.maximum(ends["first_speed"], ends["last_speed"])
         errors = within_reach(clocks["error"], speeds, sizes, clocks["time"])
         for k, (number, draw) in enumerate(group.items()):
             row = draw.row(int(ends[k].status), observed[k], clocks[k], counts[k], errors[k])
-            if whys.get(number):
-                row |= {"outcome": FAILED, "failure": FAILURES.index("not finite")}
+            if reasons.get(number):
+                row |= failed("not finite")
             rows[number] = tuple(row.values())
 
 

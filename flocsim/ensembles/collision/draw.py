@@ -141,9 +141,9 @@ def outcome_of(status: int, code: int, observed: np.ndarray) -> tuple[int, int]:
     return OUTCOMES.index(name), FAILURES.index(reason)
 
 
-def failed_row(reason: str) -> dict:
-    """Return the row of a replicate that has failed for one of FAILURES."""
-    return BLANK | {"outcome": FAILED, "failure": FAILURES.index(reason)}
+def failed(reason: str) -> dict[str, int]:
+    """Return {column: value} of a replicate that has failed for one of FAILURES."""
+    return {"outcome": FAILED, "failure": FAILURES.index(reason)}
 
 
 def columns_of(run: str) -> dict[str, str]:
@@ -190,7 +190,7 @@ class Draw:
         """Return the row of a Run that has ended so; failed where a force gives no number."""
         row = self.row(status, run.observed, run.clock, run.counts, run.error)
         if status in UNABLE and force_to_blame(self.encounter.system, run.work, run.time):
-            row |= {"outcome": FAILED, "failure": FAILURES.index("not finite")}
+            row |= failed("not finite")
         return row
 
     def row(

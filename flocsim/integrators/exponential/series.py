@@ -53,15 +53,17 @@ def write_term(work, which, k):
     series, linear, weights, largest = work.series, work.linear, work.weights, 0.0
     after, factor = k + 1.0, 1.0 / ((k + 1.0) * (k + 2.0))
     for body in range(work.place.shape[1]):
-        x = y = angle = none = 0.0
+        # Four numbers at once, as processors can; the fourth is always 0. Drag is summed apart from
+        # stiffness: in one sum each product would wait for the one before.
+        x = y = angle = unused = 0.0
         if k < 4:
             # r_k for k ≤ 3. The series of the motion starts here from k = 1: its term 2 holds the
             # forces at the start.
             x = work.remainder[which, k, body, 0]
             y = work.remainder[which, k, body, 1]
             angle = work.remainder[which, k, body, 2]
-            none = work.remainder[which, k, body, 3]
-        drag_x = drag_y = drag_angle = drag_none = 0.0
+            unused = work.remainder[which, k, body, 3]
+        drag_x = drag_y = drag_angle = drag_unused = 0.0
         for other in range(work.place.shape[1]):
             for j in range(3):
                 # Subtract K c_k and (k + 1)/h D c_{k+1} of all bodies.
@@ -70,19 +72,19 @@ def write_term(work, which, k):
                 x -= linear[STIFFNESS, body, other, j, 0] * position
                 y -= linear[STIFFNESS, body, other, j, 1] * position
                 angle -= linear[STIFFNESS, body, other, j, 2] * position
-                none -= linear[STIFFNESS, body, other, j, 3] * position
+                unused -= linear[STIFFNESS, body, other, j, 3] * position
                 drag_x += linear[DAMPING, body, other, j, 0] * speed
                 drag_y += linear[DAMPING, body, other, j, 1] * speed
                 drag_angle += linear[DAMPING, body, other, j, 2] * speed
-                drag_none += linear[DAMPING, body, other, j, 3] * speed
+                drag_unused += linear[DAMPING, body, other, j, 3] * speed
         x = (x - drag_x) * (factor * weights[MOVED, body, 0])
         y = (y - drag_y) * (factor * weights[MOVED, body, 1])
         angle = (angle - drag_angle) * (factor * weights[MOVED, body, 2])
-        none = (none - drag_none) * (factor * weights[MOVED, body, 3])
+        unused = (unused - drag_unused) * (factor * weights[MOVED, body, 3])
         series[which, k + 2, body, 0] = x
         series[which, k + 2, body, 1] = y
         series[which, k + 2, body, 2] = angle
-        series[which, k + 2, body, 3] = none
+        series[which, k + 2, body, 3] = unused
         turning = weights[LEVER, body, 2] * abs(angle)
         largest = max(largest, abs(x), abs(y), turning)
     return largest

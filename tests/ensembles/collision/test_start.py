@@ -103,6 +103,13 @@ def test_at_the_radius_rules_end_attraction_alone_brings_spheres_together(tmp_pa
     assert OUTCOMES[study.run(0, 1, 1.0, 0)["outcome"]] == outcome
 
 
+def test_the_radius_rule_counts_displacements_in_bounding_radii(tmp_path):
+    study = small_study(tmp_path, {"scene": {"delta_max": "radius"}})
+    encounter = study.draw(0, 16, 0.5, 0).encounter
+    place, _ = encounter.motion((0.3, 2.0), 0.5)
+    assert place[1, 0] == 0.5 * sum(shape.bounding_radius for shape in encounter.shapes)
+
+
 def test_by_the_radius_rule_a_straight_fall_never_overlaps():
     for shapes, angles in pairs(30):
         largest = sum(shape.bounding_radius for shape in shapes)
