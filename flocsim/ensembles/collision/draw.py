@@ -151,9 +151,6 @@ def columns_of(run: str) -> dict[str, str]:
     return {f"{run}_{name}": name for name in ("outcome", "inside", "bond")}
 
 
-CHECKED, THIRD = map(columns_of, ("checked", "third"))
-
-
 @attrs.frozen(eq=False)
 class Draw:
     """Who meets whom in a replicate, and from where.

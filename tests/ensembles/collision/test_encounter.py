@@ -7,7 +7,7 @@ import pytest
 
 from flocsim import Sphere
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.draw import CHECKED, THIRD, draws
+from flocsim.ensembles.collision.draw import columns_of, draws
 from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS
 from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.io.results.schema import OUTCOMES
@@ -95,7 +95,7 @@ def recorded(study):
 def test_recording_changes_nothing(study):
     row, _ = recorded(study)
     whole = study.run(0, 16, 0.0, 0)  # run a second and a third time, too
-    again = {name: whole[name] for name in CHECKED | THIRD}
+    again = {name: whole[name] for name in columns_of("checked") | columns_of("third")}
     assert same_row(row | again, whole)
 
 
