@@ -126,11 +126,12 @@ class Replicates:
         """Return the Result of a replicate, in a study of its own: nothing is kept of others."""
         study = study_of(self.config, self.flocs)
         index, place = divmod(number, len(study.conditions))
-        row, note = study.run_task(study.conditions[place], index, lambda: False)
+        rows, notes = study.run_some(study.conditions[place], index, index + 1, lambda: False)
+        row = dict(zip(study.row.names, rows[0].tolist(), strict=True))
         outcome = tuple(int(row[name]) for name in ("outcome", "inside", "bond", "failure"))
         steps = int(row["steps"]) + int(row["rejected"])
         digest = digest_of(*(f"{name} {row[name]!r}" for name in sorted(row)))
-        text = f"{outcome} {(note or {}).get('why', '')}".strip()
+        text = f"{outcome} {notes[0].get('why', '') if notes else ''}".strip()
         return Result(text, digest, steps, 0, np.array([row["d_c_last"]]), float(row["error"]))
 
 

@@ -127,9 +127,9 @@ def total(intervals: Iterable[Interval]) -> int:
 class StudyKind:
     """A study of one kind: `flocsim.ensembles.contents.Contents` is what becomes of its rows.
 
-    A subclass gives ``scenes``, ``format``, ``row``, `run_task` and `has_failed`; an instance has
-    the ``config`` and the ``flocs`` of a study. All else has a default. All that is random follows
-    from (seed, replicate).
+    A subclass gives ``scenes``, ``format``, ``row``, `run_task` or `run_some`, and `has_failed`; an
+    instance has the ``config`` and the ``flocs`` of a study. All else has a default. All that is
+    random follows from (seed, replicate).
     """
 
     config: "Config"
@@ -264,7 +264,7 @@ class StudyKind:
         """Compile these engines, or load them from the disk, by running a replicate of each."""
         for place, vertices in kinds:
             condition = Condition(self.scene.names[place], vertices, self.scene.delta[0])
-            self.run_task(condition, 0, lambda: False)
+            self.run_some(condition, 0, 1, lambda: False)
 
     def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:
         """Return those of these engines that are known not to be on the disk yet."""

@@ -58,11 +58,6 @@ BATCH_SECONDS, MOST_AT_A_TIME = 0.1, 256
 """Time for which replicates run before their rows are handed in, and most of them."""
 
 
-def as_dict(row: np.void) -> dict[str, Any]:
-    """Return {column: value} of a row."""
-    return dict(zip(COLUMNS, row.tolist(), strict=True))
-
-
 def says_outcome(row: Any) -> bool:
     """Whether a row says what became of a pair."""
     return OUTCOMES[row["outcome"]] not in UNKNOWN
@@ -256,7 +251,7 @@ class Study(StudyKind):
             return None
         if isinstance(why := reasons.get(0), Exception):
             raise why
-        return as_dict(rows[0])
+        return dict(zip(COLUMNS, rows[0].tolist(), strict=True))
 
     def run_all(
         self, condition: tuple[int, int, float], replicates: Sequence[int],
@@ -383,15 +378,6 @@ class Study(StudyKind):
                 text = FAILURES[rows["failure"][k]] + (f": {why}" if why else "")
             notes.append(self.note(condition, replicates[k], text))
         return rows, notes
-
-    def run_task(
-        self, condition: Condition, replicate: int, halted: Callable[[], bool], left: Any = None,
-        keep: Keep | None = None, going: Going | None = None,
-    ) -> tuple[dict | None, dict | None]:  # fmt: skip
-        """Run one replicate."""
-        rows, notes = self.run_some(condition, replicate, replicate + 1, halted)
-        row = as_dict(rows[0]) if len(rows) else None
-        return row, next(iter(notes), None)
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
         """Return flags of the rows of failed replicates."""

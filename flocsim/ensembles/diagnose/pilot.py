@@ -104,13 +104,13 @@ def forecast_of(study: Any, ranks: int, seconds: float = SECONDS) -> Forecast:
         index = study.scene.names.index(name)
         _ = study.draw(index, vertices, delta, replicate).encounter.scene
         ready = time.process_time()
-        row, _ = study.run_task(condition, replicate, stop_requested)
-        if row is None:
+        rows, _ = study.run_some(condition, replicate, replicate + 1, stop_requested)
+        if not len(rows):
             break
         runs.append(time.process_time() - ready)
         if len(study.encounters) > known:
             setups.append(ready - start)
-        ended[OUTCOMES[row["outcome"]]] += 1
+        ended[OUTCOMES[rows["outcome"][0]]] += 1
     count = expected_replicates(study.config)
     size = count * len(study.conditions)
     mean = float(np.mean(runs or [0.0]))

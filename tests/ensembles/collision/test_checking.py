@@ -124,8 +124,8 @@ def test_an_error_in_a_second_run_costs_no_replicate(tmp_path, monkeypatch):
         return original(self)
 
     monkeypatch.setattr(Implicit, "fresh_clock", broken)
-    row, note = study.run_task(study.conditions[0], 0, lambda: False)
-    assert note is None
+    [row], notes = study.run_some(study.conditions[0], 0, 1, lambda: False)
+    assert not notes
     assert [row[name] for name in CHECKS] == [FAILED, NOT_APPLICABLE, NOT_APPLICABLE]
     assert (row["outcome"], row["steps"]) == (whole["outcome"], whole["steps"])
 
