@@ -102,7 +102,9 @@ def fit_pictures(paths: Sequence[Path], options: Namespace) -> tuple[list[Pictur
     ]
     lost: dict[str, str] = {}
     pictures: list[Picture] = []
-    with workers(options.jobs, compile_fit) as mapped:
+    # Compiled before there are several processes that would all do it.
+    compiling = partial(fit_mask, np.ones((9, 9), bool), vertices=5)
+    with workers(options.jobs, compiling) as mapped:
         for (_, title, *_), result in zip(tasks, mapped(find_flocs, tasks), strict=True):
             if isinstance(result, Lost):
                 lost[title] = result.reason
@@ -207,11 +209,6 @@ def files_of(names: Sequence[str], start: str, ending: str) -> list[Path]:
     plain = [Path(name.replace(":", "-").replace("/", "-")) for name in names]
     stems = [path.stem if path.suffix.lower() in MASK_SUFFIXES else path.name for path in plain]
     return [Path(name) for name in different([f"{start}{stem}{ending}" for stem in stems])]
-
-
-def compile_fit() -> None:
-    """Compile before there are several processes that would all do it."""
-    fit_mask(np.ones((9, 9), bool), vertices=5)
 
 
 def report(error: object) -> None:
@@ -348,7 +345,13 @@ def draw_review(paths: Sequence[Path], pictures: Sequence[Picture], options: Nam
     that is possible."""
     for path in paths if pictures else []:
         template = Path(__file__).with_name("templates") / "review.html"
-        greys = (grey_in(each, options) for each in pictures)
+        # What a picture is drawn from: its grey, or its mask.
+        greys = (
+            each.found.foreground
+            if options.masks
+            else read_grey(each.path, each.plane or Plane(), options.memory)
+            for each in pictures
+        )
         page = review_page(template.read_text("utf-8"), pictures, greys)
         write_file(path, page.encode(), options.overwrite)
         print(
@@ -359,10 +362,3 @@ def draw_review(paths: Sequence[Path], pictures: Sequence[Picture], options: Nam
         has_display = sys.platform in ("darwin", "win32") or any(map(os.environ.get, DISPLAYS))
         if has_display and sys.stdout.isatty():
             webbrowser.open(path.resolve().as_uri())
-
-
-def grey_in(picture: Picture, options: Namespace) -> np.ndarray:
-    """Return what a picture is drawn from: its grey, or its mask."""
-    if options.masks:
-        return picture.found.foreground
-    return read_grey(picture.path, picture.plane or Plane(), options.memory)

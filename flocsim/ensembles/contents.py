@@ -267,21 +267,15 @@ def study_summary(
     ``note_words`` tells of a failed replicate; ``more``: warnings besides the stored ones.
     """
     warnings, failed = stored(run, "warnings"), stored(run, "failed")
-    return Summary(facts + origin(run, apart), [*map(str, warnings), *more],
-                   list(map(note_words, failed)))  # fmt: skip
-
-
-def origin(run: Mapping[str, Any], apart: Collection[str] = ()) -> Facts:
-    """All that the group ``run`` knows and a person wants to, but for what a kind says ``apart``;
-    ValueError where it cannot be read."""
-    facts = []
+    origin: Facts = []
     for name, value in run.items():
         if name in SAID_APART or name in apart or value == "":
             continue
         if isinstance(value, float):
             value = f"{value:.6g} s" if "time" in name else f"{value:.6g}"
-        facts.append((name.replace("_", " "), str(value)))
-    return facts
+        origin.append((name.replace("_", " "), str(value)))
+    return Summary(facts + origin, [*map(str, warnings), *more],
+                   list(map(note_words, failed)))  # fmt: skip
 
 
 def open_any(

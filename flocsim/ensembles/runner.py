@@ -193,7 +193,12 @@ def lead(
         ended.total = final * len(study.conditions)
         ended.wall_time = time.monotonic() - began
         if ended.code == 0:
-            ended.results = make_results(study, start, state, ended, comm.size, output)
+            kind = contents_of(study.format)
+            if start.is_covered(final):
+                ended.results = kind.read(output)  # it has all that was asked for, and stays
+            else:
+                found = facts(study, start, ended, comm.size)
+                ended.results = kind.results(study, start, final, found, output)
     comm.broadcast(ended.code)
     return ended
 
@@ -236,18 +241,6 @@ def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
         if replicate < replicates and not there:
             state.begun[task] = sum(map(study.counts_part, parts.ids))
     return state
-
-
-def make_results(
-    study: StudyKind, start: Beginning, state: StudyState, ended: Ended, ranks: int,
-    output: str | Path,
-) -> Any:  # fmt: skip
-    """Write the results of a finished study to ``output``, and return them."""
-    count = state.schedule.final
-    kind = contents_of(study.format)
-    if start.is_covered(count):
-        return kind.read(output)  # it has all that was asked for, and stays
-    return kind.results(study, start, count, facts(study, start, ended, ranks), output)
 
 
 def facts(study, start, ended, ranks):

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
-import numpy as np
 
 from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.errors import FlocsimError
@@ -56,11 +55,6 @@ def ending(row: Mapping[str, Any]) -> str:
         return f"{OUTCOMES[row['outcome']]} ({FAILURES[row['failure']]})"
     zone = {0: ", outside", 1: ", inside"}.get(row["inside"], "")
     return f"{OUTCOMES[row['outcome']]}{zone}"
-
-
-def position_of(run: Run) -> np.ndarray:
-    """Return where the bodies are (n, 3) [m, m, rad]."""
-    return run.work.place[NOW]
 
 
 @attrs.define(eq=False)
@@ -127,7 +121,7 @@ class Bench:
         elif reference.time > until:
             reference, *_ = self.run(task, self.exact, self.most_steps, until)
         bodies = self.study.draw(*task[0], task[1]).encounter.system.bodies
-        error = end_distance(bodies, position_of(run), position_of(reference))
+        error = end_distance(bodies, run.work.place[NOW], reference.work.place[NOW])
         if math.isfinite(method.tolerance):
             stated = run.error
         return attrs.evolve(found, exact=exact, error=error, stated=stated, slack=reference.error)

@@ -242,7 +242,12 @@ def _decode_tiff(path, frame, crop, memory):
             if page.axes == "SYX":
                 pixels = np.moveaxis(pixels, 0, -1)
             if page.photometric == WHITE_IS_ZERO:
-                pixels = inverted(pixels, path)
+                if pixels.dtype.kind not in "bu":
+                    raise ImageError(
+                        f"{path}: 0 is white, but of {pixels.dtype} values no value is known as "
+                        "black"
+                    )
+                pixels = np.invert(pixels)
             return pixels, ""
     except ImageError:
         raise
@@ -267,15 +272,6 @@ def left_to_pillow(page):
     orientation = page.tags.get("Orientation")
     turned = orientation is not None and orientation.value != 1
     return "it is stored turned" if turned else ""
-
-
-def inverted(pixels, path):
-    """Return pixels of which 0 is white as those of which 0 is black."""
-    if pixels.dtype == bool:
-        return ~pixels
-    if pixels.dtype.kind == "u":
-        return np.iinfo(pixels.dtype).max - pixels
-    raise ImageError(f"{path}: 0 is white, but of {pixels.dtype} values no value is known as black")
 
 
 def one_line(problem: Exception) -> str:
