@@ -71,8 +71,7 @@ def export_motion(args: argparse.Namespace) -> int:
     path = Path(args.output or f"{Path(args.source).stem}{suffix}")
     check_outputs([path], args.overwrite, [args.source], endings=(suffix,))
     kind, file = open_kind(args.source, "motion")
-    t, position, velocity, shapes = kind.motion(kind.read(file))
-    WRITERS[suffix](path, t, position, velocity, shapes, args.overwrite)
+    WRITERS[suffix](path, kind.motion(kind.read(file)), args.overwrite)
     print(path)
     return 0
 

@@ -17,6 +17,7 @@ from flocsim.io.outputs import check_ending, check_outputs
 from flocsim.io.plots.style import FIGURE_ENDINGS, save
 from flocsim.io.results.run_group import SOURCE, source_line
 from flocsim.io.trajectory import (
+    Motion,
     StoredTrajectory,
     centre_distance,
     read_trajectory,
@@ -103,9 +104,8 @@ def run(args: Namespace) -> int:
     if args.save:
         facts = {"config": config.text, "replicate": args.replicate} | study.source
         facts["zone_distance"] = found.row["D_0"]
-        write_trajectory(
-            args.save, found.t, found.position, found.velocity, found.shapes, facts, rule
-        )
+        motion = found.t, found.position, found.velocity, found.shapes
+        write_trajectory(args.save, motion, facts, rule)
     print("\n".join(map(str, outputs)))
     return 0
 
@@ -158,7 +158,7 @@ class TrajectoryFiles(Contents):
         """Return of which flocs, preset and version it is."""
         return source_line(found.facts)
 
-    def motion(self, found: StoredTrajectory) -> tuple:
+    def motion(self, found: StoredTrajectory) -> Motion:
         """Return (times, positions, velocities, shapes)."""
         return found.t, found.position, found.velocity, found.shapes
 

@@ -67,14 +67,12 @@ def centre_distance(position: np.ndarray) -> np.ndarray:
     return np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T)
 
 
+Motion = tuple[np.ndarray, np.ndarray, np.ndarray, Sequence[Shape]]
+"""Times (k,) [s], positions and velocities (k, n, 3), and the shapes of the n bodies."""
+
+
 def write_trajectory(
-    path: str | Path,
-    times: np.ndarray,
-    position: np.ndarray,
-    velocity: np.ndarray,
-    shapes: Sequence[Shape],
-    facts: Mapping[str, str | float],
-    rule: Rule = False,
+    path: str | Path, motion: Motion, facts: Mapping[str, str | float], rule: Rule = False
 ) -> None:
     """Write one replicate's motion; ``facts`` {name: number or text} become attributes.
 
@@ -82,17 +80,18 @@ def write_trajectory(
     the part, ring and spheroradius of each in ``part_0``, ``ring_0``, ``point_radius_0``, …;
     ``rule`` says what becomes of a file that is there. Raises FileError if it cannot be written.
     """
+    times, position, velocity, shapes = motion
     values: dict[str, Any] = {
         "time": times, "body": np.arange(len(shapes)), "component": COMPONENTS,
         "axis": COMPONENTS[:2], "position": position, "velocity": velocity,
     }  # fmt: skip
     for body, shape in enumerate(shapes):
-        table = table_of(shape.parts)
-        values |= {f"vertex_{body}": np.arange(len(table.place)), f"vertices_{body}": table.place,
-                   f"part_{body}": table.part, f"ring_{body}": table.ring,
-                   f"point_radius_{body}": table.radius}  # fmt: skip
-    motion = motion_group(len(shapes)).labelled(values)
-    TRAJECTORY.write(path, {"": motion}, attributes=facts, rule=rule)
+        points = table_of(shape.parts)
+        values |= {f"vertex_{body}": np.arange(len(points.place)), f"vertices_{body}": points.place,
+                   f"part_{body}": points.part, f"ring_{body}": points.ring,
+                   f"point_radius_{body}": points.radius}  # fmt: skip
+    table = motion_group(len(shapes)).labelled(values)
+    TRAJECTORY.write(path, {"": table}, attributes=facts, rule=rule)
 
 
 QUADRANT = 16
@@ -134,11 +133,8 @@ MICRO = 1e6
 ROOM = 1.05
 
 
-def write_gsd(
-    path: str | Path, times: np.ndarray, position: np.ndarray, velocity: np.ndarray,
-    shapes: Sequence[Shape], rule: Rule = False,
-) -> None:  # fmt: skip
-    """Write a motion, ``times`` (k,) [s], ``position`` and ``velocity`` (k, n, 3), as GSD.
+def write_gsd(path: str | Path, motion: Motion, rule: Rule = False) -> None:
+    """Write a motion as GSD.
 
     A frame for each instant, its time in ``log/time`` [s], spins in ``log/particles/spin`` [rad/s];
     a type for each body. UsageError where gsd is not installed, FileError where the file cannot be
@@ -149,6 +145,7 @@ def write_gsd(
     except ImportError:
         raise UsageError("gsd is not installed: pip install 'flocsim[formats]'") from None
 
+    times, position, velocity, shapes = motion
     # A box about the origin that all bodies stay inside of.
     reach = np.array([shape.bounding_radius for shape in shapes])[:, np.newaxis]
     width = 2.0 * ROOM * MICRO * float((np.abs(position[:, :, :2]) + reach).max())
@@ -203,10 +200,7 @@ KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 """Of cells, in the order of the columns of the offsets; all but Polygons are empty."""
 
 
-def write_vtkhdf(
-    path: str | Path, times: np.ndarray, position: np.ndarray, velocity: np.ndarray,
-    shapes: Sequence[Shape], rule: Rule = False,
-) -> None:  # fmt: skip
+def write_vtkhdf(path: str | Path, motion: Motion, rule: Rule = False) -> None:
     """Write a motion as `write_gsd` does, but as moving outlines for ParaView, without velocities.
 
     A polygon for every ring: its cell data are ``body``, the number, and ``hole``, 1 for the rings
@@ -214,6 +208,7 @@ def write_vtkhdf(
     """
     import h5py
 
+    times, position, _, shapes = motion
     rows = np.linspace(0, len(times) - 1, min(len(times), MOST_FRAMES)).round().astype(int)
     rings = [rings_of(shape) for shape in shapes]
     points = np.concatenate(

@@ -431,10 +431,8 @@ class Trajectory:
             "status": self.status.name, "steps": self.steps, "rejected": self.rejected,
             "error": self.error,
         }  # fmt: skip
-        write_trajectory(
-            Path(file), self.t, self.position, self.velocity, self.shapes, facts,
-            overwrite,
-        )  # fmt: skip
+        motion = self.t, self.position, self.velocity, self.shapes
+        write_trajectory(Path(file), motion, facts, overwrite)
 
     @classmethod
     def load(cls, file: str | os.PathLike) -> "Trajectory":
@@ -498,7 +496,7 @@ class Trajectory:
         if write is None:
             raise UsageError(f"{path}: an exported file must end in {' or '.join(WRITERS)}")
         check_outputs([path], rule)
-        write(path, self.t, self.position, self.velocity, self.shapes, rule)
+        write(path, (self.t, self.position, self.velocity, self.shapes), rule)
 
 
 def watched(run: Run, watch: Watch | None) -> Status:

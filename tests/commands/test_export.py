@@ -135,7 +135,8 @@ def test_libraries_give_their_flocs(capsys):
 def test_trajectories_give_every_state(capsys):
     times = np.linspace(0.0, 1.0, 5)
     position, velocity = np.random.default_rng(1).random((2, 5, 2, 3))
-    write_trajectory("run.h5", times, position, velocity, [Sphere(1e-6), Sphere(2e-6)], {})
+    shapes = [Sphere(1e-6), Sphere(2e-6)]
+    write_trajectory("run.h5", (times, position, velocity, shapes), {})
     [(name, rows)] = exported(capsys, "run.h5").items()
     assert name == "run-motion.csv"
     assert [*rows[0]][:3] == ["time", "body", "position_x"]

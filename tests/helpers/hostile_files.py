@@ -143,7 +143,7 @@ def valid_trajectory(folder):
     rng = np.random.default_rng(4)
     arrays = np.sort(rng.random(5)), rng.random((5, 2, 3)), rng.random((5, 2, 3))
     path = folder / "valid-trajectory.h5"
-    write_trajectory(path, *arrays, (Sphere(2e-6), framed(1e-6)), {"replicate": 3, "end": "I"})
+    write_trajectory(path, (*arrays, (Sphere(2e-6), framed(1e-6))), {"replicate": 3, "end": "I"})
     return read_sealed(path)
 
 

@@ -74,7 +74,7 @@ def test_vtk_reads_the_outlines_at_every_time(tmp_path, shapes):
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
     times, position, velocity = motion()
-    write_vtkhdf(tmp_path / "m", times, position, velocity, shapes)
+    write_vtkhdf(tmp_path / "m", (times, position, velocity, shapes))
     reader = hdf.vtkHDFReader()
     reader.SetFileName(str(tmp_path / "m"))
     assert reader.CanReadFile(str(tmp_path / "m"))
@@ -103,7 +103,7 @@ def test_vtk_reads_the_outlines_at_every_time(tmp_path, shapes):
 def test_gsd_reads_bodies_with_polygons(tmp_path):
     hoomd = pytest.importorskip("gsd.hoomd", reason="needs flocsim[formats]")
     times, position, velocity = motion()
-    write_gsd(tmp_path / "m.gsd", times, position, velocity, SHAPES)
+    write_gsd(tmp_path / "m.gsd", (times, position, velocity, SHAPES))
     with hoomd.open(tmp_path / "m.gsd") as frames:
         assert len(frames) == len(times)
         for step, frame in enumerate(frames):
@@ -131,7 +131,7 @@ def test_ovito_reads_places_and_shapes(tmp_path):
     pytest.importorskip("gsd", reason="needs flocsim[formats]")
     ovito = pytest.importorskip("ovito.io", reason="needs flocsim[formats]", exc_type=ImportError)
     times, position, velocity = motion()
-    write_gsd(tmp_path / "m.gsd", times, position, velocity, SHAPES)
+    write_gsd(tmp_path / "m.gsd", (times, position, velocity, SHAPES))
     pipeline = ovito.import_file(str(tmp_path / "m.gsd"))
     assert pipeline.source.num_frames == len(times)
     for step in (0, len(times) - 1):
@@ -151,14 +151,14 @@ def test_ovito_reads_places_and_shapes(tmp_path):
 def test_without_gsd_one_line_says_what_to_install(tmp_path, uninstalled):
     uninstalled("gsd")
     with pytest.raises(UsageError, match=r"gsd is not installed: pip install 'flocsim\[formats\]'"):
-        write_gsd(tmp_path / "m.gsd", *motion(), SHAPES)
+        write_gsd(tmp_path / "m.gsd", (*motion(), SHAPES))
     assert not list(tmp_path.iterdir())
 
 
 def test_the_command_writes_what_a_file_of_motion_holds(in_tmp, capsys):
     hoomd = pytest.importorskip("gsd.hoomd", reason="needs flocsim[formats]")
     times, position, velocity = motion()
-    write_trajectory("m.h5", times, position, velocity, SHAPES, {"steps": 6})
+    write_trajectory("m.h5", (times, position, velocity, SHAPES), {"steps": 6})
     assert main(["export", "gsd", "m.h5"]) == 0
     assert capsys.readouterr().out == "m.gsd\n"
     with hoomd.open("m.gsd") as frames:
@@ -176,7 +176,7 @@ def test_the_command_writes_what_a_file_of_motion_holds(in_tmp, capsys):
 
 def test_long_motions_are_thinned_and_keep_their_ends(tmp_path):
     times, position, velocity = motion(1001)
-    write_vtkhdf(tmp_path / "m.vtkhdf", times, position, velocity, SHAPES)
+    write_vtkhdf(tmp_path / "m.vtkhdf", (times, position, velocity, SHAPES))
     with h5py.File(tmp_path / "m.vtkhdf") as file:
         values = file["VTKHDF/Steps/Values"][()]
     assert len(values) == MOST_FRAMES and values[[0, -1]].tolist() == times[[0, -1]].tolist()

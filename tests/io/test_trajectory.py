@@ -26,7 +26,7 @@ def motion(count=5):
 def written(path, **facts):
     """The motion that was written to the path."""
     arrays = motion()
-    write_trajectory(path, *arrays, SHAPES, facts)
+    write_trajectory(path, (*arrays, SHAPES), facts)
     return arrays
 
 
@@ -82,7 +82,7 @@ def test_info_and_plot_read_it(in_tmp, capsys):
 def test_a_file_with_other_numbers_is_refused(tmp_path):
     times, position, velocity = motion()
     position[2, 1, 0] = np.nan
-    write_trajectory(tmp_path / "m.h5", times, position, velocity, SHAPES, {})
+    write_trajectory(tmp_path / "m.h5", (times, position, velocity, SHAPES), {})
     with pytest.raises(FileError, match="has no readable trajectory: its arrays"):
         read_trajectory(tmp_path / "m.h5")
 
@@ -90,7 +90,7 @@ def test_a_file_with_other_numbers_is_refused(tmp_path):
 def test_holes_and_parts_come_back(tmp_path):
     times, position, velocity = motion()
     shapes = (framed(1e-6), beads(1e-6))
-    write_trajectory(tmp_path / "m.h5", times, position, velocity, shapes, {})
+    write_trajectory(tmp_path / "m.h5", (times, position, velocity, shapes), {})
     again = read_trajectory(tmp_path / "m.h5")
     for one, other in zip(shapes, again.shapes, strict=True):
         assert other.area == pytest.approx(one.area, rel=1e-12)
@@ -115,7 +115,7 @@ def as_version_2(file):
 
 
 def test_trajectories_of_version_2_are_read(tmp_path):
-    write_trajectory(tmp_path / "m.h5", *motion(), SHAPES, {})
+    write_trajectory(tmp_path / "m.h5", (*motion(), SHAPES), {})
     changed(tmp_path / "m.h5", as_version_2)
     for one, other in zip(SHAPES, read_trajectory(tmp_path / "m.h5").shapes, strict=True):
         assert (other.area, other.radius) == pytest.approx((one.area, one.radius), rel=1e-12)
@@ -133,7 +133,7 @@ def one_short(file):
 
 @pytest.mark.parametrize("change", [other_ring, one_short])
 def test_rings_that_cannot_be_are_refused(tmp_path, change):
-    write_trajectory(tmp_path / "m.h5", *motion(), (framed(1e-6), beads(1e-6)), {})
+    write_trajectory(tmp_path / "m.h5", (*motion(), (framed(1e-6), beads(1e-6))), {})
     changed(tmp_path / "m.h5", change)
     with pytest.raises(FileError, match="has no readable trajectory"):
         read_trajectory(tmp_path / "m.h5")

@@ -35,6 +35,7 @@ from flocsim.io.results import swarm_file
 from flocsim.io.results.run_group import stored
 from flocsim.io.results.swarm_file import SwarmResults
 from flocsim.io.terminal import in_words
+from flocsim.io.trajectory import Motion
 
 # What is saved of a replicate while it runs.
 
@@ -334,7 +335,7 @@ class SwarmFiles(Contents):
         }
         return {name: draw for name, draw in SWARM_FIGURES.items() if there.get(name, True)}
 
-    def motion(self, found: SwarmResults) -> tuple:
+    def motion(self, found: SwarmResults) -> Motion:
         """Return (times, positions, velocities, shapes) of the first swarm; UsageError where bodies
         have left it."""
         from flocsim.io.plots.swarm import last_known, shape_of
