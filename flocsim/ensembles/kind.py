@@ -56,6 +56,9 @@ Interval = tuple[int, int]
 Code = tuple[int, int]
 """Place of a collision type, and N: they stand for all that runs the same compiled code."""
 
+Numbers = Sequence[float] | np.ndarray
+"""The random numbers of a replicate in [0, 1)."""
+
 Keep = Callable[[str, dict, bytes], object]
 """Saves a part of an unfinished replicate: name, description, data."""
 

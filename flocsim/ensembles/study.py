@@ -44,7 +44,7 @@ from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING, PairScene
 from flocsim.ensembles.config.schema import BAND, CUT, Config
 from flocsim.ensembles.diagnose.preflight import check_study, study_warnings
-from flocsim.ensembles.kind import COLUMNS, Code, Condition, Going, Keep, StudyKind
+from flocsim.ensembles.kind import COLUMNS, Code, Condition, Going, Keep, Numbers, StudyKind
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance, drive
 from flocsim.io.results.events import flips_easily
@@ -176,22 +176,18 @@ class Study(StudyKind):
             return point(self.config.seed, self.point_scrambles, replicate)
         return draws(self.config.seed, replicate)
 
-    def share_of(
-        self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray
-    ) -> float:
+    def share_of(self, encounter: Encounter, share: float, numbers: Numbers) -> float:
         """The share of a Draw with these random numbers in a condition of this ``share``."""
         return float(numbers[4]) if encounter.meeting == BROWNIAN else share
 
-    def choose_flocs(
-        self, condition: int, vertices: int, numbers: Sequence[float] | np.ndarray
-    ) -> tuple[int, int]:
+    def choose_flocs(self, condition: int, vertices: int, numbers: Numbers) -> tuple[int, int]:
         """Places of the flocs of i and j that a replicate's random numbers choose."""
         if vertices == 1 and not self.floc_pool.own_size:
             return NO_FLOC, NO_FLOC
         return self.pairings[condition].choose(numbers)
 
     def encounter(
-        self, condition: int, vertices: int, numbers: Sequence[float] | np.ndarray, end: str = CUT
+        self, condition: int, vertices: int, numbers: Numbers, end: str = CUT
     ) -> Encounter:
         """The Encounter of the flocs that a replicate's random numbers choose; ``end``: their
         outlines cut closer or wider."""
@@ -403,9 +399,7 @@ class KernelStudy(Study):
         """The point of a replicate: two orientations, two choices of floc, the offset."""
         return as_draws(super().numbers(replicate))
 
-    def share_of(
-        self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray
-    ) -> float:
+    def share_of(self, encounter: Encounter, share: float, numbers: Numbers) -> float:
         """The offset of a replicate over R_i + R_j, as a number between −1 and somewhat over 1."""
         bounds = encounter.bounds(*np.array(encounter.orientations(numbers))[:, None])
         [offset] = encounter.offsets(*bounds, np.array(numbers[4:]))

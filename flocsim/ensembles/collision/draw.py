@@ -14,7 +14,7 @@ exactly still: first and second runs may lie on one plateau.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ import numpy as np
 
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
+from flocsim.ensembles.kind import Numbers
 from flocsim.integrators.base import Integrator, Status
 from flocsim.io.results.schema import (
     AGGREGATED,
@@ -96,7 +97,7 @@ def draws(seed: int, replicate: int) -> np.ndarray:
     return found
 
 
-def orientations(numbers: Sequence[float] | np.ndarray) -> tuple[float, float]:
+def orientations(numbers: Numbers) -> tuple[float, float]:
     """Return angles θ = 2πn [rad] of bodies i and j."""
     return 2.0 * math.pi * float(numbers[0]), 2.0 * math.pi * float(numbers[1])
 

@@ -29,6 +29,7 @@ from flocsim.ensembles.collision.attraction import (
 from flocsim.ensembles.collision.draw import orientations
 from flocsim.ensembles.collision.start import Start, place_of
 from flocsim.ensembles.config.pair_scene import PairScene
+from flocsim.ensembles.kind import Numbers
 from flocsim.forces.body_forces import random_key, thermal_forces
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.forces.settling import largest_mobility, terminal_motion
@@ -241,7 +242,7 @@ class Encounter(abc.ABC):
         """How far beyond where they meet anyway attraction makes the two meet, at most [m]."""
         return attraction_width(self.pull, self.speed, 2.0 * self.outer)
 
-    def orientations(self, numbers: Sequence[float] | np.ndarray) -> tuple[float, float]:
+    def orientations(self, numbers: Numbers) -> tuple[float, float]:
         """Return the angles [rad] of i and j at the start, by a replicate's random numbers."""
         return orientations(numbers)
 

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import attrs
-import numpy as np
 
 from flocsim.compiler.disk_cache import kept
 from flocsim.compiler.processor import cpu_kind, versions
 from flocsim.ensembles.config.schema import BAND, CUT, ShapesConfig
+from flocsim.ensembles.kind import Numbers
 from flocsim.errors import ConfigError, plural
 from flocsim.geometry.fit.fit import fit_mask
 from flocsim.geometry.shapes.shape import Shape, Sphere
@@ -213,9 +213,7 @@ class FlocPool:
         more = next(sizes[k] for k in orders[1] if {sizes[k]} != found)
         return sorted(found | {more} if len(found) == 1 else found)
 
-    def choose(
-        self, numbers: Sequence[float] | np.ndarray, radius_i: float, radius_j: float
-    ) -> tuple[int, int]:
+    def choose(self, numbers: Numbers, radius_i: float, radius_j: float) -> tuple[int, int]:
         """Places of the flocs of i and j for a replicate's random numbers; two, where possible."""
         sizes = self.sizes
         pool_i, pool_j = (self.by_size(radius)[: self.pool] for radius in (radius_i, radius_j))
