@@ -33,8 +33,9 @@ from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import LIMIT_TURNS, Arrays, Encounter
 from flocsim.ensembles.collision.start import half_widths
 from flocsim.ensembles.collision.turning import angles_by_turning, turning_rates
-from flocsim.ensembles.config.pair_scene import BROWNIAN, EXTENSION, SETTLING, SHEAR, PairScene
+from flocsim.ensembles.config.pair_scene import BROWNIAN, EXTENSION, SETTLING, SHEAR
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.kind import Numbers
 from flocsim.errors import ConfigError, UsageError
 from flocsim.forces import Gravity
 from flocsim.forces.drag import body_resistance, follows_shape, resistance_matrices
@@ -241,7 +242,7 @@ class InFlow(Weightless):
             angles_by_turning(turning_rates(self.system, body)) for body in self.system.bodies
         )
 
-    def orientations(self, numbers: Sequence[float] | np.ndarray) -> tuple[float, float]:
+    def orientations(self, numbers: Numbers) -> tuple[float, float]:
         turn_i, turn_j = self.turning
         return turn_i(float(numbers[0])), turn_j(float(numbers[1]))
 
@@ -355,7 +356,13 @@ class Brownian(Weightless):
     meeting: ClassVar[str] = BROWNIAN
 
     def refuse(self) -> None:
-        refuse_release(self.options, self.shapes)
+        release, size = self.options.release, self.size
+        if not self.outer < release * size:
+            raise ConfigError(
+                f"scene.release = {release:g} (r_i + r_j) is too near: outlines can touch at "
+                f"{self.outer / size:.3g} (r_i + r_j); give a larger release, and scene.escape "
+                "above it"
+            )
         super().refuse()
 
     @property
@@ -434,17 +441,6 @@ def yield_of(system: System, body: Body) -> tuple[float, float]:
     resistance, strain = resistance_matrices(body_resistance(body))
     torque = system.fluid.viscosity * max(resistance[2, 2], math.hypot(*strain[2]))
     return nonrotating_mobility(system, body), torque / body.shape.equivalent_radius
-
-
-def refuse_release(options: PairScene, shapes: Sequence[Shape]) -> None:
-    """Raise ConfigError where outlines may touch as two bodies are released."""
-    size = sum(shape.equivalent_radius for shape in shapes)
-    outer = sum(shape.bounding_radius for shape in shapes)
-    if not outer < options.release * size:
-        raise ConfigError(
-            f"scene.release = {options.release:g} (r_i + r_j) is too near: outlines can touch at "
-            f"{outer / size:.3g} (r_i + r_j); give a larger release, and scene.escape above it"
-        )
 
 
 def make_encounter(

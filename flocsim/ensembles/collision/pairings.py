@@ -18,6 +18,7 @@ import numpy as np
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, pool_of
 from flocsim.ensembles.config.pair_scene import SETTLING, PairScene
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.kind import Numbers
 from flocsim.errors import ConfigError, plural
 
 EXPONENTS = {"number": 0, "area": 2, "volume": 3}
@@ -44,7 +45,7 @@ class Pairing(abc.ABC):
     spans: tuple[Span, Span]
 
     @abc.abstractmethod
-    def choose(self, numbers: Sequence[float] | np.ndarray) -> tuple[int, int]:
+    def choose(self, numbers: Numbers) -> tuple[int, int]:
         """Places of the flocs of i and j for a replicate's random numbers."""
 
     @property
@@ -83,7 +84,7 @@ class TwoSizes(Pairing):
     def drawn(self) -> set[int]:
         return {k for radius in self.radii for k in self.pool.by_size(radius)[: self.pool.pool]}
 
-    def choose(self, numbers: Sequence[float] | np.ndarray) -> tuple[int, int]:
+    def choose(self, numbers: Numbers) -> tuple[int, int]:
         return self.pool.choose(numbers, *self.radii)
 
 
@@ -139,7 +140,7 @@ class TwoClasses(Pairing):
             weights = [weights[0] * above, weights[0] * below]
         return [each.sizes for each in both], weights
 
-    def choose(self, numbers: Sequence[float] | np.ndarray) -> tuple[int, int]:
+    def choose(self, numbers: Numbers) -> tuple[int, int]:
         """Two flocs of unlike sizes, as if drawn until they are."""
         own, other = self.first, self.second
         # Redrawing until sizes differ favours flocs of rare sizes.
@@ -189,7 +190,12 @@ def size_classes(scene: PairScene, flocs: Sequence[Floc]) -> list[SizeClass]:
     if isinstance(scene.classes, tuple):
         number = np.searchsorted(scene.classes, chosen, side="right")
     else:
-        number = quantile_classes(chosen, weights, scene.classes or 1)
+        # All classes have the same weight; one size is in one class.
+        count = scene.classes or 1
+        _, inverse = np.unique(chosen, return_inverse=True)
+        each = np.bincount(inverse, weights)
+        middle = (np.cumsum(each) - 0.5 * each) / each.sum()
+        number = np.minimum((count * middle).astype(int), count - 1)[inverse]
     classes = []
     for place, label in enumerate(scene.class_labels):
         mine = np.flatnonzero(number == place)
@@ -219,14 +225,6 @@ def class_facts(pairings: Sequence[Pairing]) -> list[dict]:
 
 def in_words(sizes):
     return f"{1e6 * np.min(sizes):.3g} to {1e6 * np.max(sizes):.3g} um"
-
-
-def quantile_classes(sizes, weights, count):
-    """The class of every size, so that all have the same weight; one size is in one class."""
-    _, inverse = np.unique(sizes, return_inverse=True)
-    each = np.bincount(inverse, weights)
-    middle = (np.cumsum(each) - 0.5 * each) / each.sum()
-    return np.minimum((count * middle).astype(int), count - 1)[inverse]
 
 
 def pairings_of(
