@@ -8,7 +8,7 @@ from flocsim import System
 from flocsim.__main__ import main
 from flocsim.ensembles.collision.draw import FAILED, FAILURES
 from flocsim.ensembles.diagnose.preflight import check_study
-from flocsim.ensembles.kind import Condition
+from flocsim.ensembles.kind import Condition, Overseer
 from flocsim.ensembles.study import Study
 from flocsim.errors import KernelError, KernelWarning, UsageError
 from flocsim.forces import Contact
@@ -76,7 +76,7 @@ def wrong_study(folder, replicates=2, allowed=1):
 
 def task(study, replicate):
     """(row, note) of a replicate of spheres of type III."""
-    [row], notes = study.run_some(Condition("III", 1, 0.0), replicate, replicate + 1, lambda: False)
+    [row], notes = study.run_some(Condition("III", 1, 0.0), replicate, replicate + 1, Overseer())
     return row, next(iter(notes), None)
 
 

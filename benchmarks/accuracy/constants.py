@@ -38,7 +38,7 @@ from benchmarks.accuracy.tunable import PACKAGE, ROOMS, all_constants, dependent
 from benchmarks.reporting import ROOT, Table, begin
 from flocsim.compiler import composer
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.kind import study_of
+from flocsim.ensembles.kind import Overseer, study_of
 
 FACTORS = {"×2": 2.0, "÷2": 0.5}
 
@@ -126,7 +126,7 @@ class Replicates:
         """Return the Result of a replicate, in a study of its own: nothing is kept of others."""
         study = study_of(self.config, self.flocs)
         index, place = divmod(number, len(study.conditions))
-        rows, notes = study.run_some(study.conditions[place], index, index + 1, lambda: False)
+        rows, notes = study.run_some(study.conditions[place], index, index + 1, Overseer())
         row = dict(zip(study.row.names, rows[0].tolist(), strict=True))
         outcome = tuple(int(row[name]) for name in ("outcome", "inside", "bond", "failure"))
         steps = int(row["steps"]) + int(row["rejected"])

@@ -66,6 +66,15 @@ Going = Callable[[str], object]
 """Is told in words how far a replicate is."""
 
 
+class Overseer(NamedTuple):
+    """Who looks after replicates that run: ``halted()``, asked now and then, makes them leave off;
+    ``keep`` and ``going`` are for replicates that take long."""
+
+    halted: Callable[[], bool] = lambda: False
+    keep: Keep | None = None
+    going: Going | None = None
+
+
 class Condition(NamedTuple):
     """A condition by its name: collision type, number of vertices, share of δ_max."""
 
@@ -155,22 +164,20 @@ class StudyKind:
     """Names in `asked` of what all parts of a sweep have to agree on."""
 
     def run_task(
-        self, condition: Condition, replicate: int, halted: Callable[[], bool], left: Any = None,
-        keep: Keep | None = None, going: Going | None = None,
-    ) -> tuple[dict | None, dict | None]:  # fmt: skip
+        self, condition: Condition, replicate: int, overseer: Overseer, left: Any = None
+    ) -> tuple[dict | None, dict | None]:
         """Run one replicate: (row, None), (row, note) where it failed, (None, None) where halted.
 
-        ``left``: what `left_of` found; ``keep`` and ``going`` are for replicates that take long.
+        ``left``: what `left_of` found.
         """
         raise NotImplementedError
 
     def run_some(
-        self, condition: Condition, first: int, stop: int, halted: Callable[[], bool],
-        left: Any = None, keep: Keep | None = None, going: Going | None = None,
-    ) -> tuple[np.ndarray, list[dict]]:  # fmt: skip
+        self, condition: Condition, first: int, stop: int, overseer: Overseer, left: Any = None
+    ) -> tuple[np.ndarray, list[dict]]:
         """Run replicates from ``first`` on, before ``stop``: one, unless a kind runs several at a
         time. Return their rows, none where halted, and notes on those that have failed."""
-        row, note = self.run_task(condition, first, halted, left, keep, going)
+        row, note = self.run_task(condition, first, overseer, left)
         rows = [] if row is None else [tuple(row[name] for name in self.row.names or ())]
         return np.array(rows, self.row), [note] if note else []
 
@@ -267,7 +274,7 @@ class StudyKind:
         """Compile these engines, or load them from the disk, by running a replicate of each."""
         for place, vertices in kinds:
             condition = Condition(self.scene.names[place], vertices, self.scene.delta[0])
-            self.run_some(condition, 0, 1, lambda: False)
+            self.run_some(condition, 0, 1, Overseer())
 
     def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:
         """Return those of these engines that are known not to be on the disk yet."""

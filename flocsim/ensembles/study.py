@@ -44,7 +44,7 @@ from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING, PairScene
 from flocsim.ensembles.config.schema import BAND, CUT, Config
 from flocsim.ensembles.diagnose.preflight import check_study, study_warnings
-from flocsim.ensembles.kind import COLUMNS, Code, Condition, Going, Keep, Numbers, StudyKind
+from flocsim.ensembles.kind import COLUMNS, Code, Condition, Numbers, Overseer, StudyKind
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance, drive
 from flocsim.io.results.events import flips_easily
@@ -345,9 +345,8 @@ class Study(StudyKind):
         ]  # fmt: skip
 
     def run_some(
-        self, condition: Condition, first: int, stop: int, halted: Callable[[], bool],
-        left: Any = None, keep: Keep | None = None, going: Going | None = None,
-    ) -> tuple[np.ndarray, list[dict]]:  # fmt: skip
+        self, condition: Condition, first: int, stop: int, overseer: Overseer, left: Any = None
+    ) -> tuple[np.ndarray, list[dict]]:
         """Run as many replicates as take some BATCH_SECONDS. An exception costs one alone: its row
         says that it has failed, and a note what is needed to run it again.
 
@@ -358,7 +357,7 @@ class Study(StudyKind):
         replicates = range(first, min(first + min(self.at_a_time, MOST_AT_A_TIME), stop))
         began = time.monotonic()
         try:
-            rows, reasons = self.run_all(place, replicates, halted)
+            rows, reasons = self.run_all(place, replicates, overseer.halted)
         except Halted:
             return np.zeros(0, self.row), []
         each = (time.monotonic() - began) / len(replicates)

@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 
 from flocsim.body import Body
-from flocsim.ensembles.kind import PHYSICS, Condition, StudyKind
+from flocsim.ensembles.kind import PHYSICS, Condition, Overseer, StudyKind
 from flocsim.ensembles.one_table import OneTable
 from flocsim.fields import choice, quantity
 from flocsim.geometry.shapes.shape import Sphere
@@ -87,13 +87,13 @@ class LoneStudy(StudyKind):
         return System(bodies, config.forces, config.integrator.method, config.fluid)
 
     def run_task(
-        self, condition: Condition, replicate: int, halted: Callable[[], bool], *_: Any
+        self, condition: Condition, replicate: int, overseer: Overseer, left: Any = None
     ) -> tuple[dict | None, dict | None]:
         """Run a floc: how fast it sinks, and how far it drifts away."""
         until, most = self.scene.duration, self.config.integrator.max_steps
         run = self.system(condition.vertices, replicate).begin(until, max_steps=most)
         before = run.work.place[NOW, 1, :2].copy()
-        status = run.to_end(halted)
+        status = run.to_end(overseer.halted)
         if status == Status.PAUSED:
             return None, None
         x, y = run.work.place[NOW, 1, :2] - before

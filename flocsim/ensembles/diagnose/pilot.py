@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.kind import Overseer
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.process import stop_requested
 
@@ -104,7 +105,7 @@ def forecast_of(study: Any, ranks: int, seconds: float = SECONDS) -> Forecast:
         index = study.scene.names.index(name)
         _ = study.draw(index, vertices, delta, replicate).encounter.scene
         ready = time.process_time()
-        rows, _ = study.run_some(condition, replicate, replicate + 1, stop_requested)
+        rows, _ = study.run_some(condition, replicate, replicate + 1, Overseer(stop_requested))
         if not len(rows):
             break
         runs.append(time.process_time() - ready)

@@ -13,7 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.kind import Chunk, StudyKind
+from flocsim.ensembles.kind import Chunk, Overseer, StudyKind
 from flocsim.ensembles.parallel.communicator import (
     SILENCE_LIMIT,
     SLEEP,
@@ -256,9 +256,8 @@ def run_chunk(
         def keep(name: str, about: dict, data: bytes, replicate: int = first) -> None:
             tell(Kept(chunk.condition, replicate, name, about, data))
 
-        rows, more = study.run_some(
-            condition, first, chunk.stop, halted, chunk.left, keep, lambda words: tell(Going(words))
-        )
+        overseer = Overseer(halted, keep, lambda words: tell(Going(words)))
+        rows, more = study.run_some(condition, first, chunk.stop, overseer, chunk.left)
         parts.append(rows)
         notes += more
         first += len(rows)

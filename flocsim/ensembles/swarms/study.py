@@ -21,7 +21,7 @@ from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, neares
 from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
 from flocsim.ensembles.diagnose.preflight import config_warnings, require_contact, warning_lines
-from flocsim.ensembles.kind import ORDER, PHYSICS, Code, Condition, Going, Keep, StudyKind
+from flocsim.ensembles.kind import ORDER, PHYSICS, Code, Condition, Overseer, StudyKind
 from flocsim.ensembles.swarms.results import (
     BODIES,
     STATE,
@@ -281,24 +281,22 @@ class SwarmStudy(StudyKind):
     # How a replicate runs.
 
     def run_task(
-        self, condition: Condition, replicate: int, halted: Callable[[], bool],
-        left: dict[str, np.ndarray] | None = None, keep: Keep | None = None,
-        going: Going | None = None,
-    ) -> tuple[dict | None, dict | None]:  # fmt: skip
+        self, condition: Condition, replicate: int, overseer: Overseer, left: Any = None
+    ) -> tuple[dict | None, dict | None]:
         """Run a replicate from its start, or from the state that is ``left`` of it, to its end.
 
-        ``keep`` takes its parts as they come. ``halted()``, looked at between windows and now and
-        then within long ones, makes it leave off, its state kept.
+        ``overseer.keep`` takes its parts as they come. ``overseer.halted()``, looked at between
+        windows and now and then within long ones, makes it leave off, its state kept.
         """
 
         def save(name: str, arrays: Arrays) -> None:
-            if keep is not None:
-                keep(name, {}, encoded(arrays))
+            if overseer.keep is not None:
+                overseer.keep(name, {}, encoded(arrays))
 
         def look(tried: int) -> bool:
-            if going is not None:
-                going(f"swarm {replicate} at {progress.time:.4g} s, {tried} steps further")
-            return halted()
+            if overseer.going is not None:
+                overseer.going(f"swarm {replicate} at {progress.time:.4g} s, {tried} steps further")
+            return overseer.halted()
 
         scene, stops = self.scene, self.stops
         try:
@@ -352,7 +350,7 @@ class SwarmStudy(StudyKind):
             bonds = bond_gauge.bonds(stops[place], motion, near, (stops[place - 1], seen))
             save(moment_name(place), moment_part(scene, swarm, gauge, progress, bonds))
             seen = motion
-            if place + 1 < len(stops) and halted():
+            if place + 1 < len(stops) and overseer.halted():
                 save_state(place + 1)
                 return None, None
         row = {name: getattr(progress.effort, name, 0) for name in ENDS}

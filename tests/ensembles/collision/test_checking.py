@@ -16,6 +16,7 @@ from flocsim.ensembles.collision.draw import (
     further_runs,
 )
 from flocsim.ensembles.diagnose.dry_run import checked_words
+from flocsim.ensembles.kind import Overseer
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from flocsim.integrators.parts import FixedStep
@@ -124,7 +125,7 @@ def test_an_error_in_a_second_run_costs_no_replicate(tmp_path, monkeypatch):
         return original(self)
 
     monkeypatch.setattr(Implicit, "fresh_clock", broken)
-    [row], notes = study.run_some(study.conditions[0], 0, 1, lambda: False)
+    [row], notes = study.run_some(study.conditions[0], 0, 1, Overseer())
     assert not notes
     assert [row[name] for name in CHECKS] == [FAILED, NOT_APPLICABLE, NOT_APPLICABLE]
     assert (row["outcome"], row["steps"]) == (whole["outcome"], whole["steps"])

@@ -15,6 +15,7 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
+from flocsim.ensembles.kind import Overseer
 from flocsim.ensembles.swarms.results import decoded
 from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import UsageError
@@ -97,10 +98,10 @@ def run_parts(config, halts=(), left=None, replicate=0):
     """([(name, data)] of the parts that a replicate saves, its row); it is asked to halt at some
     looks."""
     parts, looks, study = [], iter(range(10**9)), SwarmStudy(config)
-    row, _ = study.run_task(
-        study.conditions[0], replicate, lambda: next(looks) in halts, left,
-        lambda name, about, data: parts.append((name, data)),
-    )  # fmt: skip
+    overseer = Overseer(
+        lambda: next(looks) in halts, lambda name, about, data: parts.append((name, data))
+    )
+    row, _ = study.run_task(study.conditions[0], replicate, overseer, left)
     return parts, row
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, norm
 
+from flocsim.ensembles.kind import Overseer
 from flocsim.ensembles.runner import run
 from flocsim.ensembles.swarms.study import SPHERE, SwarmStudy, lognormal
 from flocsim.errors import ConfigError, UsageError
@@ -109,9 +110,8 @@ def test_a_replicate_whose_bodies_find_no_place_is_a_failed_one(tmp_path):
     faults = np.flatnonzero(least > 85e-6)
     assert len(faults) and faults[0] > 0, "else this shows nothing"
     saved = []
-    row, note = found.run_task(
-        found.conditions[0], int(faults[0]), lambda: False, keep=lambda *part: saved.append(part)
-    )
+    overseer = Overseer(keep=lambda *part: saved.append(part))
+    row, note = found.run_task(found.conditions[0], int(faults[0]), overseer)
     assert row["finished"] == 0 and "box" in note["why"]
     assert [name for name, *_ in saved] == ["bodies"]
 
