@@ -132,16 +132,16 @@ class Effort:
 class Progress:
     """A swarm on its way.
 
-    Parameters: ``runner``; ``swarm``, its arrays; ``box`` [m]; ``reach`` [m] of all forces;
-    ``until`` [s]; ``leaving``, what becomes of bodies that leave the box (None: they go on);
-    ``shielding``, what clusters make of drag (None: nothing).
+    Parameters: ``runner``; ``swarm``, its arrays; ``until`` [s]; ``leaving``, what becomes of
+    bodies that leave the box (None: they go on); ``shielding``, what clusters make of drag (None:
+    nothing).
     """
 
     def __init__(
-        self, runner: Runner, swarm: Swarm, box: tuple[float, float], reach: float, until: float,
-        leaving: Leaving | None = None, shielding: Shielding | None = None,
+        self, runner: Runner, swarm: Swarm, until: float, leaving: Leaving | None = None,
+        shielding: Shielding | None = None,
     ) -> None:  # fmt: skip
-        self.runner, self.swarm, self.box, self.reach = runner, swarm, box, reach
+        self.runner, self.swarm = runner, swarm
         self.leaving, self.shielding = leaving, shielding
         self.gone = np.zeros(len(swarm.bodies), bool)
         self.returns = np.zeros(len(swarm.bodies), dtype=np.int64)
@@ -231,20 +231,21 @@ class Progress:
         if not self.free.any():
             self.time = stop
             return Status.FINISHED
-        swarm, way, began = self.swarm, LONGEST_WAY * min(self.box), self.effort.body_steps
+        swarm, began = self.swarm, self.effort.body_steps
+        way = LONGEST_WAY * min(self.runner.box)
         if self.shielding is not None:
             way = min(way, WAY * self.mean_radius)
             self.shielding.apply(swarm.bodies, swarm.motion[:, :3])
         span = min(self.span, self.time_to_go(way))
         least = swarm._replace(wander=self.least_wander)
-        clusters = Islands.of(self.runner.reached(least, 0.0, self.reach, self.box))
+        clusters = Islands.of(self.runner.reached(least, 0.0))
         finished, reached, done = Finished(self.free), None, 0.0
         for tried in itertools.count(1):
             whole = span >= ALL_BUT * (stop - self.time)
             swarm.times[sw.BEGIN] = self.time
             swarm.times[sw.END] = stop if whole else self.time + span
             length = swarm.times[sw.END] - self.time
-            reached = self.runner.reached(swarm, length, self.reach, self.box, reached)
+            reached = self.runner.reached(swarm, length, reached)
             islands = Islands.of(reached)
             fresh = islands.chosen(finished.missing(islands))
             if not len(fresh.sizes):

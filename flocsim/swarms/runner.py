@@ -186,7 +186,8 @@ class Islands:
 
 @attrs.define
 class Runner:
-    """Finds and runs islands: the compiled functions, and each thread's arrays."""
+    """Finds and runs islands: the compiled functions, each thread's arrays, the ``box`` [m] and the
+    ``reach`` [m] of all forces."""
 
     finder: Callable[..., int]
     joiner: Callable[..., int]
@@ -194,13 +195,12 @@ class Runner:
     integrator: Integrator
     threads: list[ThreadArrays]
     max_steps: int
+    box: tuple[float, float]
+    reach: float
     pairs: np.ndarray = attrs.field(factory=lambda: BodyPair.rows(256))
     pool: ThreadPoolExecutor | None = None
 
-    def reached(
-        self, swarm: Swarm, span: float, reach: float, box: tuple[float, float],
-        before: Reached | None = None,
-    ) -> Reached:  # fmt: skip
+    def reached(self, swarm: Swarm, span: float, before: Reached | None = None) -> Reached:
         """Who can reach whom in a window of so many seconds; with what was known ``before`` it was
         run: who has."""
         n, gone = len(swarm.bodies), swarm.bodies["mass"] == 0.0
@@ -209,7 +209,7 @@ class Runner:
         touches = np.zeros((n, len(walls)), dtype=np.bool_)
         find = self.finder if before is None else self.joiner
         while (
-            found := find(swarm, span, reach, *box, self.pairs, labels, walls, touches)
+            found := find(swarm, span, self.reach, *self.box, self.pairs, labels, walls, touches)
         ) > len(self.pairs):  # fmt: skip
             self.pairs = BodyPair.rows(2 * found)
         labels[gone] = -1

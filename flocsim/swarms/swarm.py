@@ -307,13 +307,13 @@ class Swarm:
         runner = Runner(
             compose(find_islands, {}), compose(join_islands, {}),
             compose(run_islands, fillings, what=what), self.integrator,
-            [ThreadArrays(scene) for _ in range(threads)], max_steps,
+            [ThreadArrays(scene) for _ in range(threads)], max_steps, self.box, self.reach,
         )  # fmt: skip
         swarm = swarm_of(scene, *self.system.motion(), self.integrator.fresh_clock())
         shielding = None
         if shields_clusters(self.forces):
             shielding = Shielding(self.bodies, self.forces, self.gauge())
-        return Progress(runner, swarm, self.box, self.reach, until, leaving, shielding)
+        return Progress(runner, swarm, until, leaving, shielding)
 
     def fillings(self) -> dict[Callable, Callable]:
         """Return {hook: function} of integrator, shapes and path recording.

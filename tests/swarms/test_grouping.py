@@ -54,7 +54,7 @@ def test_who_follows_one_that_lands_is_of_its_island_from_the_first():
     bodies = [floor(50.0 * R, beyond=0.0), lying, *falling]
     swarm = Swarm(bodies, [Gravity(), StokesDrag(), Contact()], fluid=WATER)
     progress = swarm.begin(1.0)
-    reached = progress.runner.reached(progress.swarm, 1.5 * R / 1e-4, progress.reach, progress.box)
+    reached = progress.runner.reached(progress.swarm, 1.5 * R / 1e-4)
     assert reached.labels[1:].tolist() == [1, 1, 1]
 
 

@@ -32,10 +32,10 @@ def progress_of(swarm, until):
     runner = Runner(
         compose(find_islands, {}, jit=False), compose(join_islands, {}, jit=False),
         compose(run_islands, swarm.fillings(), jit=False), swarm.integrator,
-        [ThreadArrays(scene)], 10**6,
+        [ThreadArrays(scene)], 10**6, swarm.box, swarm.reach,
     )  # fmt: skip
     arrays = swarm_of(scene, *swarm.system.motion(), swarm.integrator.fresh_clock())
-    return Progress(runner, arrays, swarm.box, swarm.reach, until)
+    return Progress(runner, arrays, until)
 
 
 def swarm_end(places, seed=(5, 0), stops=(UNTIL,)):
