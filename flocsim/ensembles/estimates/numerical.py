@@ -41,6 +41,9 @@ OF_KINDS, SHIFTED = "of kinds", "shifted"
 counts of kinds stand under KIND_COUNTS."""
 KIND_COUNTS = "kinds"
 
+Intervals = dict[str, tuple[np.ndarray, np.ndarray]]
+"""{probability: (low, high)}."""
+
 Codes = Sequence[np.ndarray]
 """Outcome, inside and bond of runs as in the results file, (…, replicate); the outcome of what was
 not run is NOT_APPLICABLE."""
@@ -168,7 +171,7 @@ def further(of_kinds: np.ndarray, counts: np.ndarray) -> list[np.ndarray]:
 
 def change_intervals(
     counts: Mapping[str, np.ndarray], totals: Mapping[str, Events] | None = None
-) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+) -> Intervals:
     """Return {probability: (low, high)}: 95 % interval of its change if all replicates were run
     exactly.
 
@@ -343,9 +346,7 @@ NEGLIGIBLE = 1e-6
 """Weight below which a distribution is left out."""
 
 
-def numerical_of(
-    intervals: Mapping[str, tuple[np.ndarray, np.ndarray]],
-) -> dict[str, np.ndarray]:
+def numerical_of(intervals: Intervals) -> dict[str, np.ndarray]:
     """Return {"pr_…_numerical": array} of every probability: the larger side of its
     change_intervals."""
     return {
@@ -354,9 +355,7 @@ def numerical_of(
     }
 
 
-def change_columns(
-    intervals: Mapping[str, tuple[np.ndarray, np.ndarray]],
-) -> dict[str, np.ndarray]:
+def change_columns(intervals: Intervals) -> dict[str, np.ndarray]:
     """Return the arrays of NUMERICS."""
     return {
         f"{name}_change{end}": intervals[name][side]

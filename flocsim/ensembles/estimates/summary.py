@@ -153,8 +153,7 @@ def tables_of(sums: Sums) -> dict[str, Any]:
 
 
 def table_from(
-    counted: Mapping[str, np.ndarray],
-    changes: dict[str, tuple[np.ndarray, np.ndarray]] | None = None,
+    counted: Mapping[str, np.ndarray], changes: numerical.Intervals | None = None
 ) -> dict[str, np.ndarray]:
     """Return the table of probabilities from what is counted of conditions; ``changes``: its
     change_intervals, where they are there."""

@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.contents import MEANINGS, Differences, changes_between, common
-from flocsim.ensembles.estimates.numerical import Codes, change_intervals, count_changes
+from flocsim.ensembles.estimates.numerical import Codes, Intervals, change_intervals, count_changes
 from flocsim.ensembles.estimates.statistics import (
     EXACT_RUNS,
     between,
@@ -92,9 +92,7 @@ def compared_events(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -
     return {name: found[name] for name in COMPARED}
 
 
-def changes_of(
-    first: Codes, again: Codes, third: Codes
-) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def changes_of(first: Codes, again: Codes, third: Codes) -> Intervals:
     """Return {probability: (low, high)} of how much each of COMPARED would change, run exactly."""
     totals = {
         name: Events(*(flags.sum(axis=-1) for flags in each))
