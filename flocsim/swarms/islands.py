@@ -290,18 +290,18 @@ def take_state(swarm, work, observed, clock, members, first):
         swarm.new_methods[member] = clock.across
 
 
-def run_islands(
-    swarm, scene, work, observed, clocks, counts, record, members, starts, codes, costs, found,
-    first, last,
-):  # fmt: skip
-    """Run the islands from ``first`` to before ``last``, all of as many bodies as ``scene`` has:
-    their Status into ``codes``. How far that went: to one that found no room, or to the last.
+def run_islands(swarm, arrays, islands, found, first, last):
+    """Run the islands from ``first`` to before ``last``, all of as many bodies as the ``arrays``
+    are for: their Status into ``islands.codes``. How far that went: to one that found no room, or
+    to the last.
 
-    ``clocks`` and ``counts``: of the island that runs, RUNNING, and as each of them begins, FRESH.
+    ``arrays``: IslandArrays; ``islands``: Islands (runner.py).
     """
+    scene, work, observed = arrays.scene, arrays.work, arrays.observed
+    clocks, counts, members = arrays.clocks, arrays.counts, islands.members
     clock, count = clocks[sw.RUNNING], counts[sw.RUNNING]
     for island in range(first, last):
-        begin = starts[island]
+        begin = islands.starts[island]
         put_scene(swarm, scene, members, begin)
         put_state(swarm, work, members, begin)
         for pair in range(work.budget.shape[0]):
@@ -314,14 +314,14 @@ def run_islands(
         put_times(swarm, work, observed, clocks, counts, members, begin)
         if clock.across == 1.0:
             touch_plainly(work)
-        code = advance(scene, work, observed, clock, count, record)
+        code = advance(scene, work, observed, clock, count, arrays.record)
         if code == NO_ROOM:
             return island
         if code == FINISHED and not take_slips(swarm, scene, work, found, members, begin):
             return island
-        codes[island] = code
-        costs[island, sw.STEPS_TAKEN] = count.steps
-        costs[island, sw.STEPS_REJECTED] = count.rejected
-        costs[island, sw.FORCES_SUMMED] = work.tally.evaluations
+        islands.codes[island] = code
+        islands.costs[island, sw.STEPS_TAKEN] = count.steps
+        islands.costs[island, sw.STEPS_REJECTED] = count.rejected
+        islands.costs[island, sw.FORCES_SUMMED] = work.tally.evaluations
         take_state(swarm, work, observed, clock, members, begin)
     return last

@@ -49,15 +49,18 @@ def budget_of(max_steps: int, bodies: int) -> int:
     return max(1, max_steps * FULL_BUDGET // max(bodies, FULL_BUDGET))
 
 
-@attrs.define
-class IslandArrays:
-    """Arrays for islands of a number of bodies."""
+class IslandArrays(NamedTuple):
+    """Arrays for islands of a number of bodies.
+
+    ``clocks`` and ``counts``: of the island that runs, RUNNING, and as each of them begins, FRESH.
+    """
 
     scene: Scene
     work: Work
     observed: np.ndarray
     clocks: np.ndarray
     counts: np.ndarray
+    record: np.ndarray
 
 
 class ThreadArrays:
@@ -101,7 +104,7 @@ class ThreadArrays:
             work = work_of(scene, zeros, zeros, room, pairs=pairs, blocks=blocks)
             self.by_size[size] = IslandArrays(
                 scene, work, np.zeros((size, sw.TRACK_COLUMNS)),
-                Clock.rows(2), Counts.rows(2),
+                Clock.rows(2), Counts.rows(2), np.zeros((0, 1)),
             )  # fmt: skip
         return self.by_size[size]
 
@@ -115,7 +118,7 @@ class ThreadArrays:
     def enlarge(self, size: int, work: Work) -> None:
         """Use arrays with more room for islands of so many bodies, and of more than a few at once
         for all to come: one that finds none begins its window again."""
-        self.by_size[size].work = work
+        self.by_size[size] = self.by_size[size]._replace(work=work)
         if size > FEW:
             have = len(work.candidates), len(work.pairs), len(work.elimination.column)
             self.room_of_many = tuple(
@@ -133,8 +136,7 @@ class Reached(NamedTuple):
     touches: np.ndarray
 
 
-@attrs.define
-class Islands:
+class Islands(NamedTuple):
     """The islands of a window: members of each, sorted, fixed bodies among them."""
 
     members: np.ndarray
@@ -220,23 +222,19 @@ class Runner:
     ) -> None:
         """Run islands of one size."""
         size = int(islands.sizes[first])
-        own.running = place = own.of_size(size, self.integrator)
-        place.clocks[sw.FRESH] = self.integrator.fresh_clock()
-        place.counts[sw.FRESH] = self.integrator.fresh_counts(budget_of(self.max_steps, size))
-        record = np.zeros((0, 1))
+        own.running = arrays = own.of_size(size, self.integrator)
+        arrays.clocks[sw.FRESH] = self.integrator.fresh_clock()
+        arrays.counts[sw.FRESH] = self.integrator.fresh_counts(budget_of(self.max_steps, size))
         own.make_room(LINKS * size * (last - first))
         while not own.halted:
-            first = self.driver(
-                swarm, place.scene, place.work, place.observed, place.clocks, place.counts, record,
-                islands.members, islands.starts, islands.codes,
-                islands.costs, own.found, first, last,
-            )  # fmt: skip
+            arrays = own.by_size[size]
+            first = self.driver(swarm, arrays, islands, own.found, first, last)
             if first == last:
                 return
-            if place.work.tally.full == NOTHING_FULL:
+            if arrays.work.tally.full == NOTHING_FULL:
                 own.make_room(len(own.found.links))
             else:
-                self.driver, work = extended(self.driver, place.work)
+                self.driver, work = extended(self.driver, arrays.work)
                 own.enlarge(size, work)
 
     def run(
