@@ -9,13 +9,13 @@ in which order they run, and in how many threads, changes no number.
 import math
 
 import flocsim.swarms.arrays as sw
-from flocsim.geometry.contact.body_pairs import lists_all_pairs
 from flocsim.geometry.contact.candidates import save_contacts
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
-from flocsim.state.bodies import MOST_FRAMES, VX, VY, X, Y
+from flocsim.run import clear
+from flocsim.state.bodies import VX, VY, X, Y
 from flocsim.state.clock import CANDIDATES_FULL
 from flocsim.state.contacts import OPEN
-from flocsim.state.work import ALL_STATES, NOW, PROPAGATED, STATES, all_counting
+from flocsim.state.work import NOW, PROPAGATED, begin
 
 
 def box_at(stretch):
@@ -79,45 +79,10 @@ def put_scene(swarm, scene, members, first):
     scene.first[scene.bodies.shape[0]] = point
 
 
-def clear_body(work, body):
-    """Set what a run knows of a body besides its motion to zero."""
-    pose, errors, cluster, kick = (
-        work.poses[body],
-        work.errors[body],
-        work.clusters[body],
-        work.kicks[body],
-    )
-    pose.listed_x = pose.listed_y = pose.listed_angle = pose.cosine = pose.sine = 0.0
-    pose.known_angle = pose.known_cosine = pose.known_sine = 0.0
-    errors.velocity_lifetime = errors.relaxation_time = errors.step_displacement = (
-        errors.step_velocity
-    ) = errors.stated = 0.0
-    errors.displacement = errors.velocity = errors.switch_displacement = errors.switch_velocity = (
-        0.0
-    )
-    errors.uncertain_displacement = errors.uncertain_velocity = 0.0
-    cluster.mass = cluster.shift_x = cluster.shift_y = cluster.scale = (
-        cluster.largest_displacement
-    ) = 0.0
-    cluster.force_x = cluster.force_y = cluster.rate_x = cluster.rate_y = 0.0
-    kick.x = kick.y = kick.turn = 0.0
-    for stage in range(MOST_FRAMES):
-        frame = work.frames[body, stage]
-        frame.rotation_cosine = frame.rotation_sine = frame.shift_x = frame.shift_y = 0.0
-
-
 def put_state(swarm, work, members, first):
-    """The state of its bodies into its work; nothing else of that is left from before."""
+    """The state of its bodies into its work, in which nothing else is left from before."""
     for body in range(work.poses.shape[0]):
         member = members[first + body]
-        for row in range(ALL_STATES):
-            for axis in range(3):
-                work.place[row, body, axis] = 0.0
-                work.velocity[row, body, axis] = 0.0
-        for row in range(STATES):
-            for axis in range(3):
-                work.force[row, body, axis] = 0.0
-        clear_body(work, body)
         for axis in range(3):
             work.place[NOW, body, axis] = swarm.motion[member, axis]
             work.place[PROPAGATED, body, axis] = swarm.carried[member, axis]
@@ -130,13 +95,7 @@ def put_state(swarm, work, members, first):
         known.switch_velocity = swarm.errors[member, 3]
         known.uncertain_displacement = swarm.errors[member, 4]
         known.uncertain_velocity = swarm.errors[member, 5]
-        work.order[body] = body
         work.cluster[body] = body
-    work.kick.start = work.kick.duration = 0.0
-    work.tally.candidates = work.tally.pairs = work.tally.kept = work.tally.full = 0
-    work.tally.evaluations = work.tally.rebuilds = work.tally.solves = 0
-    work.tally.kind = work.tally.series_terms = 0
-    work.elimination.pattern[0] = 0
 
 
 def local_of(members, first, size, body):
@@ -301,27 +260,25 @@ def run_islands(swarm, arrays, islands, found, first, last):
     clocks, counts, members = arrays.clocks, arrays.counts, islands.members
     clock, count = clocks[sw.RUNNING], counts[sw.RUNNING]
     for island in range(first, last):
-        begin = islands.starts[island]
-        put_scene(swarm, scene, members, begin)
-        put_state(swarm, work, members, begin)
-        for pair in range(work.budget.shape[0]):
-            work.budget[pair] = -1.0
-        if lists_all_pairs(work):
-            work.tally.pairs = all_counting(scene.bodies, work.pairs)
-        if not put_slips(swarm, scene, work, members, begin):
+        at = islands.starts[island]
+        put_scene(swarm, scene, members, at)
+        clear(arrays.block)
+        begin(scene, work, True)
+        put_state(swarm, work, members, at)
+        if not put_slips(swarm, scene, work, members, at):
             work.tally.full = CANDIDATES_FULL
             return island
-        put_times(swarm, work, observed, clocks, counts, members, begin)
+        put_times(swarm, work, observed, clocks, counts, members, at)
         if clock.across == 1.0:
             touch_plainly(work)
         code = advance(scene, work, observed, clock, count, arrays.record)
         if code == NO_ROOM:
             return island
-        if code == FINISHED and not take_slips(swarm, scene, work, found, members, begin):
+        if code == FINISHED and not take_slips(swarm, scene, work, found, members, at):
             return island
         islands.codes[island] = code
         islands.costs[island, sw.STEPS_TAKEN] = count.steps
         islands.costs[island, sw.STEPS_REJECTED] = count.rejected
         islands.costs[island, sw.FORCES_SUMMED] = work.tally.evaluations
-        take_state(swarm, work, observed, clock, members, begin)
+        take_state(swarm, work, observed, clock, members, at)
     return last

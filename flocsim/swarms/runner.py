@@ -17,7 +17,7 @@ from flocsim.integrators.base import Integrator
 from flocsim.run import extended
 from flocsim.state.clock import NOTHING_FULL, Clock, Counts
 from flocsim.state.contacts import BodyPair
-from flocsim.state.declared import enlarged, zeros_of
+from flocsim.state.declared import block_of, enlarged, zeros_of
 from flocsim.state.outlines import CorePoint
 from flocsim.state.scene import Scene
 from flocsim.state.work import Work, work_of
@@ -50,13 +50,14 @@ def budget_of(max_steps: int, bodies: int) -> int:
 
 
 class IslandArrays(NamedTuple):
-    """Arrays for islands of a number of bodies.
+    """Arrays for islands of a number of bodies; ``block``: the memory of ``work``.
 
     ``clocks`` and ``counts``: of the island that runs, RUNNING, and as each of them begins, FRESH.
     """
 
     scene: Scene
     work: Work
+    block: np.ndarray
     observed: np.ndarray
     clocks: np.ndarray
     counts: np.ndarray
@@ -103,7 +104,7 @@ class ThreadArrays:
             room, pairs, blocks = (size * each for each in rooms)
             work = work_of(scene, zeros, zeros, room, pairs=pairs, blocks=blocks)
             self.by_size[size] = IslandArrays(
-                scene, work, np.zeros((size, sw.TRACK_COLUMNS)),
+                scene, work, block_of(work), np.zeros((size, sw.TRACK_COLUMNS)),
                 Clock.rows(2), Counts.rows(2), np.zeros((0, 1)),
             )  # fmt: skip
         return self.by_size[size]
@@ -118,7 +119,7 @@ class ThreadArrays:
     def enlarge(self, size: int, work: Work) -> None:
         """Use arrays with more room for islands of so many bodies, and of more than a few at once
         for all to come: one that finds none begins its window again."""
-        self.by_size[size] = self.by_size[size]._replace(work=work)
+        self.by_size[size] = self.by_size[size]._replace(work=work, block=block_of(work))
         if size > FEW:
             have = len(work.candidates), len(work.pairs), len(work.elimination.column)
             self.room_of_many = tuple(

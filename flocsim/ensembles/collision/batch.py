@@ -12,7 +12,6 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.by_pointer import Stacked, address_of, table_of
-from flocsim.compiler.linker import apart
 from flocsim.ensembles.collision.draw import BLANK, Draw, failed
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.outcomes import BODY_I, BODY_J, OBSERVER
@@ -21,7 +20,7 @@ from flocsim.ensembles.kind import ROW
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, PAUSED, STOPPED, advance
 from flocsim.integrators.rhs.error import outline_size
-from flocsim.run import STEPS_AT_A_TIME, UNABLE, extended, force_to_blame, within_reach
+from flocsim.run import STEPS_AT_A_TIME, UNABLE, clear, extended, force_to_blame, within_reach
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.clock import Clock, Counts
 from flocsim.state.declared import block_of
@@ -54,14 +53,6 @@ class Progress(Record):
     at: int  # number of the replicate at hand
     begun: int  # 1 if that has begun
     steps_left: int  # after so many steps the batch pauses
-
-
-@apart
-def clear(block):
-    """Set an array of whole numbers to zero."""
-    # Apart, as other code knows this memory by other names, and must not read it before.
-    for word in range(block.shape[0]):
-        block[word] = 0
 
 
 def put_start(scene, work, start):
