@@ -6,6 +6,7 @@ import numpy as np
 
 from flocsim.state.bodies import MOTION_COLUMNS, BodyConstants, Disc
 from flocsim.state.clock import Clock
+from flocsim.state.contacts import SavedContact
 from flocsim.state.declared import zeros_of
 from flocsim.state.outlines import CorePoint
 from flocsim.state.scene import Scene
@@ -26,19 +27,6 @@ ERROR_COLUMNS = 6
     HORIZON_AT,  # when the run ends [s]
     TIME_COUNT,
 ) = range(4)
-
-# Columns of ``links``: contacts of which more is known than where the bodies are.
-(
-    LATER_BODY,  # the body of the larger number
-    EARLIER_BODY,
-    AT_VERTEX,  # core point of the vertex, of all bodies'
-    AT_EDGE,  # first core point of the edge, of all bodies'
-    MODE,  # how it touched (KEPT_MODE)
-    LINK_COLUMNS,
-) = range(6)
-
-SLIP_COLUMNS = 5
-"""Columns of ``slips``, of the same contacts: ``slip`` to ``short_flights`` of SavedContact."""
 
 # Columns of ``costs``, of every island.
 (
@@ -86,8 +74,9 @@ class Swarm(NamedTuple):
     methods: Annotated[np.ndarray, ("n",)]  # 1: its island's steps went on across switches
     wander: Annotated[np.ndarray, ("n",)]  # how far it may stray from a straight path [m]
     first_link: Annotated[np.ndarray, ("after",), np.int64]  # where contacts of a later body begin
-    links: Annotated[np.ndarray, ("k", LINK_COLUMNS), np.int64]
-    slips: Annotated[np.ndarray, ("k", SLIP_COLUMNS)]
+    # Contacts of which more is known than where the bodies are; bodies and points by their numbers
+    # among all.
+    links: Annotated[np.ndarray, ("k",), SavedContact]
     new_motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # from here on: at the window's end
     new_carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
     new_errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]
@@ -119,14 +108,13 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: Cl
 class Found(NamedTuple):
     """What islands have left behind, filled up to ``filled[0]``."""
 
-    links: Annotated[np.ndarray, ("k", LINK_COLUMNS), np.int64]
-    slips: Annotated[np.ndarray, ("k", SLIP_COLUMNS)]
+    links: Annotated[np.ndarray, ("k",), SavedContact]
     filled: Annotated[np.ndarray, (1,), np.int64]
 
 
-def with_links(swarm: Swarm, links: np.ndarray, slips: np.ndarray) -> Swarm:
+def with_links(swarm: Swarm, links: np.ndarray) -> Swarm:
     """The swarm with these contacts, in the order of their bodies."""
-    order = np.lexsort(links.T[::-1])
-    links, slips = np.ascontiguousarray(links[order]), np.ascontiguousarray(slips[order])
-    first = np.searchsorted(links[:, LATER_BODY], np.arange(len(swarm.bodies) + 1))
-    return swarm._replace(links=links, slips=slips, first_link=first.astype(np.int64))
+    order = np.lexsort([links[name] for name in ("mode", "edge", "vertex", "earlier", "later")])
+    links = SavedContact.joined([links[order]])
+    first = np.searchsorted(links["later"], np.arange(len(swarm.bodies) + 1))
+    return swarm._replace(links=links, first_link=first.astype(np.int64))

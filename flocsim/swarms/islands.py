@@ -117,23 +117,16 @@ def put_slips(swarm, scene, work, members, first):
     for body in range(size):
         member = members[first + body]
         for link in range(swarm.first_link[member], swarm.first_link[member + 1]):
-            other = local_of(members, first, size, swarm.links[link, sw.EARLIER_BODY])
+            other = local_of(members, first, size, swarm.links[link].earlier)
             if other < 0:
                 continue
             if count == work.kept.shape[0]:
                 return False
-            work.kept[count].later, work.kept[count].earlier = body, other
-            work.kept[count].vertex = local_point(
-                swarm, scene, members, first, swarm.links[link, sw.AT_VERTEX], body, other
-            )
-            work.kept[count].edge = local_point(
-                swarm, scene, members, first, swarm.links[link, sw.AT_EDGE], body, other
-            )
-            work.kept[count].mode = swarm.links[link, sw.MODE]
+            work.kept[count] = swarm.links[link]
             kept = work.kept[count]
-            kept.slip, kept.slip_offset = swarm.slips[link, 0], swarm.slips[link, 1]
-            kept.grazing_force, kept.gap_offset = swarm.slips[link, 2], swarm.slips[link, 3]
-            kept.short_flights = swarm.slips[link, 4]
+            kept.later, kept.earlier = body, other
+            kept.vertex = local_point(swarm, scene, members, first, kept.vertex, body, other)
+            kept.edge = local_point(swarm, scene, members, first, kept.edge, body, other)
             count += 1
     work.tally.kept = count + 1
     return True
@@ -202,22 +195,12 @@ def take_slips(swarm, scene, work, found, members, first):
     if begin + count > found.links.shape[0]:
         return False
     for kept in range(count):
-        later, earlier = work.kept[kept].later, work.kept[kept].earlier
-        row = begin + kept
-        found.links[row, sw.LATER_BODY] = members[first + later]
-        found.links[row, sw.EARLIER_BODY] = members[first + earlier]
-        found.links[row, sw.AT_VERTEX] = global_point(
-            swarm, scene, members, first, work.kept[kept].vertex, later, earlier
-        )
-        found.links[row, sw.AT_EDGE] = global_point(
-            swarm, scene, members, first, work.kept[kept].edge, later, earlier
-        )
-        found.links[row, sw.MODE] = work.kept[kept].mode
-        found.slips[row, 0] = work.kept[kept].slip
-        found.slips[row, 1] = work.kept[kept].slip_offset
-        found.slips[row, 2] = work.kept[kept].grazing_force
-        found.slips[row, 3] = work.kept[kept].gap_offset
-        found.slips[row, 4] = work.kept[kept].short_flights
+        found.links[begin + kept] = work.kept[kept]
+        link = found.links[begin + kept]
+        later, earlier = link.later, link.earlier
+        link.vertex = global_point(swarm, scene, members, first, link.vertex, later, earlier)
+        link.edge = global_point(swarm, scene, members, first, link.edge, later, earlier)
+        link.later, link.earlier = members[first + later], members[first + earlier]
     found.filled[0] = begin + count
     return True
 

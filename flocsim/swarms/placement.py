@@ -27,7 +27,7 @@ from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import WallShape
 from flocsim.state.bodies import ANGLE, VY, X, Y
-from flocsim.swarms.arrays import EARLIER_BODY, LATER_BODY, Swarm, with_links
+from flocsim.swarms.arrays import Swarm, with_links
 from flocsim.swarms.together.clusters import Gauge, placed_together
 
 MOST_TRIALS = 5_000
@@ -254,9 +254,8 @@ class Leaving:
         swarm.motion[gone, axis] = -apart * (2.0 + np.arange(len(gone)))[gone]
         for array in (swarm.stated, swarm.strayed, swarm.carried, swarm.errors):
             array[gone] = 0.0
-        pairs = swarm.links[:, [LATER_BODY, EARLIER_BODY]]
-        kept = ~gone[pairs].any(axis=1)
-        return with_links(swarm, swarm.links[kept], swarm.slips[kept])
+        kept = ~(gone[swarm.links["later"]] | gone[swarm.links["earlier"]])
+        return with_links(swarm, swarm.links[kept])
 
     def returned(self, swarm: Swarm, members: np.ndarray, present: np.ndarray, count: int) -> None:
         """Move a cluster back in, for the ``count``-th time."""

@@ -16,6 +16,7 @@ import flocsim.swarms.arrays as sw
 from flocsim.integrators.base import Status
 from flocsim.run import known_error
 from flocsim.state.bodies import VX, VY
+from flocsim.state.contacts import SavedContact
 from flocsim.swarms.arrays import Swarm, with_links
 from flocsim.swarms.placement import REMOVE, Leaving
 from flocsim.swarms.runner import Islands, Look, Runner
@@ -29,20 +30,19 @@ class Finished:
     """The islands that have been run to the end of one window, of ``free`` (n,) bodies that move.
 
     ``labels`` (n,): which of them a free body is of; ``sizes`` (k,): bodies of each;
-    ``links`` and ``slips``: the contacts that they leave, in any order.
+    ``links``: the contacts that they leave, in any order.
     """
 
     def __init__(self, free: np.ndarray) -> None:
         self.free = free
         self.labels = np.full(len(free), NONE)
         self.sizes = np.zeros(0, dtype=np.int64)
-        self.links = np.zeros((0, sw.LINK_COLUMNS), dtype=np.int64)
-        self.slips = np.zeros((0, sw.SLIP_COLUMNS))
+        self.links = SavedContact.rows(0)
 
     def owners(self, links: np.ndarray) -> np.ndarray:
         """A free body of every contact."""
-        later = links[:, sw.LATER_BODY]
-        return np.where(self.free[later], later, links[:, sw.EARLIER_BODY])
+        later = links["later"]
+        return np.where(self.free[later], later, links["earlier"])
 
     def missing(self, islands: Islands) -> np.ndarray:
         """Which islands are not among them. One of the same free bodies, and as many fixed ones,
@@ -55,7 +55,7 @@ class Finished:
         first = np.minimum.reduceat(np.where(free, labels, len(self.sizes)), starts)
         return np.flatnonzero((first != last) | (islands.sizes != self.sizes[last]))
 
-    def add(self, islands: Islands, links: np.ndarray, slips: np.ndarray) -> None:
+    def add(self, islands: Islands, links: np.ndarray) -> None:
         """Add islands, with the contacts that they leave; what was known of their bodies goes."""
         island = np.repeat(np.arange(len(islands.sizes)), islands.sizes)
         free = self.free[islands.members]
@@ -64,8 +64,7 @@ class Finished:
         kept = self.labels[self.owners(self.links)] != NONE
         self.labels[bodies] = len(self.sizes) + island[free]
         self.sizes = np.append(self.sizes, islands.sizes)
-        self.links = np.concatenate([self.links[kept], links])
-        self.slips = np.concatenate([self.slips[kept], slips])
+        self.links = SavedContact.joined([self.links[kept], links])
 
 
 LEAST_WANDER = 0.05
@@ -102,8 +101,7 @@ ALL_BUT = 0.999
 """A window that ends behind this share of what is left ends with it."""
 
 
-OF_CONTACTS = ("links", "slips")
-STATE = ("motion", "carried", "errors", "steps", "methods", "wander", *OF_CONTACTS)
+STATE = ("motion", "carried", "errors", "steps", "methods", "wander", "links")
 """Arrays of a swarm that the rest of a run follows from."""
 
 
@@ -199,9 +197,9 @@ class Progress:
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Go on from a `state` of a run of the same swarm: to the same bytes as that run itself."""
         for name in STATE:
-            if name not in OF_CONTACTS:
+            if name != "links":
                 getattr(self.swarm, name)[...] = state[name]
-        self.swarm = with_links(self.swarm, state["links"], state["slips"])
+        self.swarm = with_links(self.swarm, state["links"])
         self.time, self.span = float(state["time"]), float(state["span"])
         self.effort = Effort(*state["effort"].tolist())
         self.returns[...] = state["returns"]
@@ -276,7 +274,7 @@ class Progress:
         contacts = self.runner.run(self.swarm, fresh, look)
         if contacts is None:
             return Status.STOPPED
-        finished.add(fresh, *contacts)
+        finished.add(fresh, contacts)
         self.effort.add(fresh)
         for each in np.flatnonzero(fresh.codes != Status.FINISHED).tolist():
             self.failed = fresh.members_of(each)
@@ -298,7 +296,7 @@ class Progress:
         swarm.motion[~free, :VX] += length * swarm.motion[~free, VX:]
         strayed, wander = MORE_WANDER * swarm.strayed, LESS_WANDER * swarm.wander
         np.maximum(np.maximum(strayed, wander), self.least_wander, out=swarm.wander)
-        self.swarm = with_links(swarm, finished.links, finished.slips)
+        self.swarm = with_links(swarm, finished.links)
         self.time = float(swarm.times[sw.END])
         self.stated[...] = swarm.stated
         self.effort.windows += 1

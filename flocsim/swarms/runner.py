@@ -16,7 +16,7 @@ import flocsim.swarms.arrays as sw
 from flocsim.integrators.base import Integrator
 from flocsim.run import extended
 from flocsim.state.clock import NOTHING_FULL, Clock, Counts
-from flocsim.state.contacts import BodyPair
+from flocsim.state.contacts import BodyPair, SavedContact
 from flocsim.state.declared import block_of, enlarged, zeros_of
 from flocsim.state.outlines import CorePoint
 from flocsim.state.scene import Scene
@@ -238,12 +238,9 @@ class Runner:
                 self.driver, work = extended(self.driver, arrays.work)
                 own.enlarge(size, work)
 
-    def run(
-        self, swarm: Swarm, islands: Islands, look: Look | None = None
-    ) -> tuple[np.ndarray, np.ndarray] | None:
+    def run(self, swarm: Swarm, islands: Islands, look: Look | None = None) -> np.ndarray | None:
         """Run islands, those of a size one after another, in all threads: the contacts that they
-        leave behind (links and slips), in any order; None where a look at them said to leave off.
-        """
+        leave behind (k,), in any order; None where a look at them said to leave off."""
         chunks = chunks_of(islands.sizes)
         largest = int(islands.sizes.max(initial=0))
 
@@ -282,10 +279,9 @@ class Runner:
             each.result()
         if halted:
             return None
-        counts = [int(own.found.filled[0]) for own in self.threads]
-        both = list(zip(self.threads, counts, strict=True))
-        links = np.concatenate([own.found.links[:count] for own, count in both])
-        return links, np.concatenate([own.found.slips[:count] for own, count in both])
+        found = (own.found for own in self.threads)
+        links: np.ndarray = SavedContact.joined([each.links[: each.filled[0]] for each in found])
+        return links
 
     def watched(
         self, at_work: list[Future[None]], tried: Callable[[], int], look: Look | None
