@@ -340,22 +340,14 @@ def of_forces(pieces: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def scene_of(
-    bodies: Sequence[Body],
-    fluid: Fluid,
-    parameters: Sequence[float] | np.ndarray = (),
-    *,
-    laws: Any = NO_LAWS,
-    outlines: tuple[float, float, float, float] = NO_OUTLINES,
-    layer: tuple[float, float, float] = NO_LAYER,
-    resistances: Sequence[Sequence[float]] | None = None,
-    **others: Any,
-) -> Scene:
-    """Return the bodies as one Scene of new arrays, with the contributions of their forces.
+def scene_of(bodies: Sequence[Body], fluid: Fluid, resistances: Any = None, **fields: Any) -> Scene:
+    """Return the bodies as one Scene of new arrays.
 
-    Without these the scene has no laws. ``resistances``: of every body, if a drag follows shapes
-    (flocsim.forces.drag); ``others``: further fields of the Scene.
+    ``resistances``: of every body, if a drag follows shapes (flocsim.forces.drag); ``fields``:
+    those of the Scene that forces contribute, without which it has no laws, and further ones.
     """
+    given: dict[str, Any] = {"parameters": np.zeros(0), "laws": NO_LAWS, **fields}
+    reach, layer = given.get("outlines", NO_OUTLINES)[0], given.get("layer", NO_LAYER)
     shapes = [body.shape for body in bodies]
     # Fields of BodyConstants in their order, up to the resistances.
     columns: tuple[Iterable[float], ...] = (
@@ -370,27 +362,20 @@ def scene_of(
         [shape.long_axis for shape in shapes],
         range(len(bodies)),
     )
-    without_drag = np.zeros((len(bodies), RESISTANCE_COLUMNS))
+    if resistances is None:
+        resistances = np.zeros((len(bodies), RESISTANCE_COLUMNS))
     known = BodyConstants.rows(len(bodies))
-    rows = zip(
-        zip(*columns, strict=True),
-        without_drag if resistances is None else resistances,
-        strict=True,
-    )
+    rows = zip(zip(*columns, strict=True), resistances, strict=True)
     known[:] = [(*own, *resistance, *UNSHIELDED) for own, resistance in rows]
     scene = Scene(
         bodies=known,
         **outlines_of(shapes)._asdict(),
         # Outlines, charges and fields are empty unless a force between outlines needs them.
-        **pieces_of_bodies(shapes if outlines[0] > 0.0 else (), len(bodies))._asdict(),
+        **pieces_of_bodies(shapes if reach > 0.0 else (), len(bodies))._asdict(),
         **charges_of_bodies(shapes, layer[0])._asdict(),
         **field_of_bodies(shapes, layer[0])._asdict(),
-        parameters=np.array(parameters, dtype=float),
-        laws=laws,
-        outlines=outlines,
-        layer=layer,
-        **others,
+        **given,
     )
     # Features are listed for surface forces, and for a pair resistance between outlines.
-    reach = max(scene.surface_reach, scene.water.near_cut or -1.0)
-    return scene._replace(listed_reach=reach)
+    listed_reach = max(scene.surface_reach, scene.water.near_cut or -1.0)
+    return scene._replace(listed_reach=listed_reach)

@@ -65,7 +65,7 @@ def placed(drawn):
 
 def arrays(shapes, places, capacity=4):
     """Scene and work arrays of two bodies."""
-    scene = scene_of([Body(shape, surface_density=2.0) for shape in shapes], Fluid(), [-1.0])
+    scene = scene_of([Body(shape, surface_density=2.0) for shape in shapes], Fluid())
     return scene, work_of(scene, places, np.zeros((2, 3)), capacity=capacity)
 
 

@@ -12,7 +12,7 @@ from flocsim.state.work import NOW, work_of
 
 def arrays(*bodies):
     """Scene and listed work arrays of bodies at rest."""
-    scene = scene_of(bodies, Fluid(), [])
+    scene = scene_of(bodies, Fluid())
     position = np.array([[*body.position, body.angle] for body in bodies])
     work = work_of(scene, position, np.zeros((len(bodies), 3)))
     assert rebuild_list(scene, work)

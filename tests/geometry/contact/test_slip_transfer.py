@@ -26,7 +26,7 @@ def slab(corners, height=4e-6):
 
 def resting_on(slab_body, body, x, height, speed):
     """Scene and work arrays of a body at (x, height) that moves along the slab's top."""
-    scene = scene_of([slab_body, body], Fluid(), [])
+    scene = scene_of([slab_body, body], Fluid())
     position = np.array([[*slab_body.position, 0.0], [x, height, body.angle]])
     velocity = np.array([[0.0, 0.0, 0.0], [speed, 0.0, 0.0]])
     work = work_of(scene, position, velocity)

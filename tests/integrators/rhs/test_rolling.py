@@ -22,7 +22,7 @@ KITE = SpheroPolygon(1e-6 * np.array([[-3, 0], [0, -1.5], [2, 0], [0, 2.0]]), 8e
 def placed(shapes, places):
     """Scene and work of two bodies at (x, y, angle), listed and located."""
     bodies = [Body(shape, density=2650.0) for shape in shapes]
-    scene = scene_of(bodies, Fluid(), [])
+    scene = scene_of(bodies, Fluid())
     work = work_of(scene, np.array(places, dtype=float), np.zeros((2, 3)))
     assert rebuild_list(scene, work)
     locate_contacts(scene, work, NOW)
