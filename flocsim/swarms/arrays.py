@@ -4,15 +4,12 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from flocsim.state.bodies import MOTION_COLUMNS, BodyConstants, Disc
+from flocsim.state.bodies import MOTION_COLUMNS, BodyConstants, BodyErrors, Disc
 from flocsim.state.clock import Clock
 from flocsim.state.contacts import SavedContact
 from flocsim.state.declared import zeros_of
 from flocsim.state.outlines import CorePoint
 from flocsim.state.scene import Scene
-
-ERROR_COLUMNS = 6
-"""Columns of ``errors``: ``place`` to ``uncertain_velocity`` of BodyErrors."""
 
 # Which of an island's clocks, and of its counts.
 (
@@ -69,7 +66,7 @@ class Swarm(NamedTuple):
     vertices: Annotated[np.ndarray, (0,), CorePoint]
     motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
     carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # the vector of the state's error
-    errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]  # what errors of steps have led to
+    errors: Annotated[np.ndarray, ("n",), BodyErrors]  # what errors of steps have led to
     steps: Annotated[np.ndarray, ("n",)]  # size of the next step [s]
     methods: Annotated[np.ndarray, ("n",)]  # 1: its island's steps went on across switches
     wander: Annotated[np.ndarray, ("n",)]  # how far it may stray from a straight path [m]
@@ -79,7 +76,7 @@ class Swarm(NamedTuple):
     links: Annotated[np.ndarray, ("k",), SavedContact]
     new_motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # from here on: at the window's end
     new_carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
-    new_errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]
+    new_errors: Annotated[np.ndarray, ("n",), BodyErrors]
     new_steps: Annotated[np.ndarray, ("n",)]
     new_methods: Annotated[np.ndarray, ("n",)]
     stated: Annotated[np.ndarray, ("n",)]  # the stated error of every body [m]

@@ -88,13 +88,7 @@ def put_state(swarm, work, members, first):
             work.place[PROPAGATED, body, axis] = swarm.carried[member, axis]
             work.velocity[NOW, body, axis] = swarm.motion[member, VX + axis]
             work.velocity[PROPAGATED, body, axis] = swarm.carried[member, VX + axis]
-        known = work.errors[body]
-        known.displacement = swarm.errors[member, 0]
-        known.velocity = swarm.errors[member, 1]
-        known.switch_displacement = swarm.errors[member, 2]
-        known.switch_velocity = swarm.errors[member, 3]
-        known.uncertain_displacement = swarm.errors[member, 4]
-        known.uncertain_velocity = swarm.errors[member, 5]
+        work.errors[body] = swarm.errors[member]
         work.cluster[body] = body
 
 
@@ -220,15 +214,13 @@ def take_state(swarm, work, observed, clock, members, first):
             swarm.new_carried[member, axis] = work.place[PROPAGATED, body, axis]
             swarm.new_motion[member, VX + axis] = work.velocity[NOW, body, axis]
             swarm.new_carried[member, VX + axis] = work.velocity[PROPAGATED, body, axis]
-        known = work.errors[body]
-        swarm.new_errors[member, 0] = known.displacement
-        swarm.new_errors[member, 1] = known.velocity
-        swarm.new_errors[member, 2] = known.switch_displacement
-        swarm.new_errors[member, 3] = known.switch_velocity
-        swarm.new_errors[member, 4] = known.uncertain_displacement
-        swarm.new_errors[member, 5] = known.uncertain_velocity
+        swarm.new_errors[member] = work.errors[body]
+        # What errors of steps have led to goes on; the rest is of a run.
+        known = swarm.new_errors[member]
+        swarm.stated[member] = known.stated
+        known.stated = known.velocity_lifetime = known.relaxation_time = 0.0
+        known.step_displacement = known.step_velocity = 0.0
         swarm.new_steps[member] = clock.step
-        swarm.stated[member] = work.errors[body].stated
         swarm.new_methods[member] = clock.across
 
 
