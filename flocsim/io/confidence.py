@@ -81,24 +81,26 @@ def proportion(
         raise UsageError(f"confidence must lie between 0 and 1, found {confidence!r}")
     most = trials + unknown
     with np.errstate(divide="ignore", invalid="ignore"):
-        ends = successes / most, (successes + unknown) / most
-        return successes / trials, *between_bounds(*ends, most, most, confidence)
+        ends = (successes / most, most), ((successes + unknown) / most, most)
+        return successes / trials, *between_bounds(*ends, confidence)
+
+
+Known = tuple[np.ndarray, np.ndarray]
+"""A share, and the trials that it is known from."""
 
 
 def between_bounds(
-    least: np.ndarray, most: np.ndarray, trials_least: np.ndarray, trials_most: np.ndarray,
-    confidence: float = 0.95,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Return (low, high) of a share between two, each known from so many trials."""
+    least: Known, most: Known, confidence: float = 0.95
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return (low, high) of a share between two."""
     two_sided = normal_quantile(confidence)
     # Standard errors, as half the width of a score interval over its quantile.
     error = [
         np.diff(score_interval(share, trials, two_sided), axis=0)[0] / (2.0 * two_sided)
-        for share, trials in ((least, trials_least), (most, trials_most))
+        for share, trials in (least, most)
     ]
-    z = bounds_quantile(most - least, np.maximum(*error), confidence)
-    low, high = score_interval(least, trials_least, z)[0], score_interval(most, trials_most, z)[1]
-    return low, high
+    z = bounds_quantile(most[0] - least[0], np.maximum(*error), confidence)
+    return score_interval(*least, z)[0], score_interval(*most, z)[1]
 
 
 def bounds_quantile(width: np.ndarray, error: np.ndarray, confidence: float = 0.95) -> np.ndarray:
@@ -217,7 +219,7 @@ def clustered_proportion(
         low = score_interval(shares[1], numbers[1], t)[0]
         high = score_interval(shares[2], numbers[2], t)[1]
     else:
-        low, high = between_bounds(shares[1], shares[2], numbers[1], numbers[2])
+        low, high = between_bounds((shares[1], numbers[1]), (shares[2], numbers[2]))
     return shares[0], low, high, numbers[0]
 
 

@@ -220,9 +220,8 @@ def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray
     which LATE_RATES is known beforehand. Where any may flip, ``most`` is one at least.
     """
     flips, runs = np.sum(flipped), np.sum(checked)
-    k, m, log_prior = LATE_RATES
-    weights = weights_of(k, m, log_prior, flips, runs)
-    found = predicted(k, m, weights, np.broadcast_arrays(flips, runs, exposed))
+    rates = weighed(LATE_RATES, flips, runs)
+    found = predicted(rates, np.broadcast_arrays(flips, runs, exposed))
     found[0] = np.maximum(found[0], exposed > 0.0)
     return found
 
@@ -264,21 +263,27 @@ def further_flips(
     # Conditions of the same f of c weigh the distributions alike: computed once, counted often.
     seen, times = np.unique(np.stack([f.ravel(), c.ravel()]), axis=1, return_counts=True)
     k, m = (each.ravel() for each in np.meshgrid(SHAPES, MEANS))
-    weights = weights_of(k, m, 0.5 * np.log(m), seen[0], seen[1], times)
+    k, m, weights = weighed((k, m, 0.5 * np.log(m)), seen[0], seen[1], times)
     some = weights > NEGLIGIBLE
-    return predicted(k[some], m[some], weights[some] / weights[some].sum(), (f, c, u), confidence)
+    rates = k[some], m[some], weights[some] / weights[some].sum()
+    return predicted(rates, (f, c, u), confidence)
 
 
-def weights_of(
-    k: np.ndarray, m: np.ndarray, log_prior: np.ndarray,
-    flipped: np.ndarray, checked: np.ndarray, times: ArrayLike = 1,
-) -> np.ndarray:  # fmt: skip
-    """Return the posterior weights of gamma distributions of shapes k and means m of a rate.
+Gammas = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Shapes k and means m of gamma distributions of a rate, and their weights or the logarithms of
+these."""
+
+
+def weighed(
+    prior: Gammas, flipped: np.ndarray, checked: np.ndarray, times: ArrayLike = 1
+) -> Gammas:
+    """Return gamma distributions with their posterior weights, from the logarithms of prior ones.
 
     ``flipped`` of ``checked`` runs were seen in conditions, each so many ``times``.
     """
     from scipy.special import gammaln
 
+    k, m, log_prior = prior
     f, c = np.atleast_1d(flipped), np.atleast_1d(checked)
     rate = (k / m)[:, np.newaxis]
     # log of the negative binomial's Γ(k + f)/Γ(k) (r/(r + c))^k (r + c)^−f, r = k/m: factors of f
@@ -290,13 +295,12 @@ def weights_of(
     logs = np.sum(logs * times, axis=1) + log_prior
     # The largest weight is set to 1 before exponentials are taken: none of them overflows.
     weights = np.exp(logs - logs.max())
-    return weights / weights.sum()
+    return k, m, weights / weights.sum()
 
 
 def predicted(
-    k: np.ndarray, m: np.ndarray, weights: np.ndarray, seen: Sequence[np.ndarray],
-    confidence: float = EACH_SIDE,
-) -> np.ndarray:  # fmt: skip
+    rates: Gammas, seen: Sequence[np.ndarray], confidence: float = EACH_SIDE
+) -> np.ndarray:
     """Return (most, mean, none) (3, …), see further_flips, by weighted gamma distributions.
 
     ``seen``: f flipped of c checked, and u exposed. Given f of c, a rate has shape k + f and rate
@@ -306,6 +310,7 @@ def predicted(
     """
     from scipy.special import betainc
 
+    k, m, weights = rates
     # Conditions of the same numbers have the same bound: found once.
     shape_of_result = seen[0].shape
     cases, index = np.unique(np.stack([each.ravel() for each in seen]), axis=1, return_inverse=True)
