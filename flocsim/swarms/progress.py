@@ -39,11 +39,6 @@ class Finished:
         self.sizes = np.zeros(0, dtype=np.int64)
         self.links = SavedContact.rows(0)
 
-    def owners(self, links: np.ndarray) -> np.ndarray:
-        """A free body of every contact."""
-        later = links["later"]
-        return np.where(self.free[later], later, links["earlier"])
-
     def missing(self, islands: Islands) -> np.ndarray:
         """Which islands are not among them. One of the same free bodies, and as many fixed ones,
         has the same of these: it can reach no fewer than before."""
@@ -61,7 +56,9 @@ class Finished:
         free = self.free[islands.members]
         bodies = islands.members[free]
         self.labels[bodies] = NONE
-        kept = self.labels[self.owners(self.links)] != NONE
+        later = self.links["later"]
+        owners = np.where(self.free[later], later, self.links["earlier"])  # free ones
+        kept = self.labels[owners] != NONE
         self.labels[bodies] = len(self.sizes) + island[free]
         self.sizes = np.append(self.sizes, islands.sizes)
         self.links = SavedContact.joined([self.links[kept], links])
@@ -277,7 +274,7 @@ class Progress:
         finished.add(fresh, contacts)
         self.effort.add(fresh)
         for each in np.flatnonzero(fresh.codes != Status.FINISHED).tolist():
-            self.failed = fresh.members_of(each)
+            self.failed = fresh.members[fresh.starts[each] : fresh.starts[each + 1]]
             return Status(int(fresh.codes[each]))
         members, swarm = fresh.members, self.swarm
         swarm.wander[members] = np.maximum(swarm.wander[members], swarm.strayed[members])

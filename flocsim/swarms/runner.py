@@ -168,10 +168,6 @@ class Islands(NamedTuple):
     def sizes(self) -> np.ndarray:
         return np.diff(self.starts)
 
-    def members_of(self, island: int) -> np.ndarray:
-        """The bodies of an island, in their order."""
-        return self.members[self.starts[island] : self.starts[island + 1]]
-
     def chosen(self, which: np.ndarray) -> "Islands":
         """Some of them, the largest first, those of a size one after another."""
         order = which[np.argsort(-self.sizes[which], kind="stable")]
