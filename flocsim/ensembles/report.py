@@ -286,11 +286,6 @@ def verdict(found: Results) -> tuple[int, str]:
     return FlocsimError.exit_code if none else WITHHELD * too_many, line
 
 
-def undecided_line(results: Results) -> str:
-    """Return what `verdict` says, without the word warning."""
-    return verdict(results)[1].removeprefix("warning: ")
-
-
 def numerics_line(results: Results) -> str:
     """Return the numerical error of a study in one line."""
     table = results.probabilities

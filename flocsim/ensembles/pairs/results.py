@@ -136,7 +136,7 @@ class PairFiles(Contents):
         run = results.run
         facts = conditions(results) + sizes(results) + outcomes(results)
         facts += settling(run) + thermal(run)
-        more = filter(None, [report.undecided_line(results)])
+        more = filter(None, [report.verdict(results)[1].removeprefix("warning: ")])
         return study_summary(facts, run, run_group.describe_note, SAID_APART, more)
 
     def table(self, results: schema.Results, numerics: bool = False, every: bool = False) -> str:

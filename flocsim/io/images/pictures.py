@@ -82,10 +82,6 @@ class Segmentation:
     holes: np.ndarray | None = None
 
     @property
-    def annotated(self) -> bool:
-        return any(each.reason == ANNOTATION for each in self.rejected)
-
-    @property
     def foreground_share(self) -> float:
         return float(self.foreground.mean())
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from flocsim.errors import ImageError
-from flocsim.io.images.stacks import TIFF_SUFFIXES, Plane, stack_of
+from flocsim.io.images.stacks import TIFF_SUFFIXES, Crop, Plane, stack_of
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 """Endings that are taken for pictures when a folder is given."""
@@ -300,9 +300,8 @@ def check_file(path: Path, what: str) -> None:
 
 
 def check_memory(
-    name: object, stored: int, shape: Sequence[int],
-    crop: tuple[int, int, int, int] | None = None, memory: float = MEMORY,
-) -> None:  # fmt: skip
+    name: object, stored: int, shape: Sequence[int], crop: Crop = None, memory: float = MEMORY
+) -> None:
     """ImageError for a picture or mask that needs more bytes than it may take.
 
     stored: bytes of its decoded pixels; shape: (h, w, …), worked on but for what is cropped.

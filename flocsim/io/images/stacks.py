@@ -27,6 +27,10 @@ PLANES = r'\{"shape": \[([34]), (\d+), (\d+)\]'
 TIFF_SUFFIXES = (".tif", ".tiff")
 
 
+Crop = tuple[int, int, int, int] | None
+"""A part of a picture, or all of it."""
+
+
 @attrs.frozen
 class Plane:
     """Which of the pictures in a file: its ``frame`` in the order of the file, the ``sample`` of
@@ -34,7 +38,7 @@ class Plane:
 
     frame: int = 0
     sample: int | None = None
-    crop: tuple[int, int, int, int] | None = None
+    crop: Crop = None
 
 
 @attrs.frozen
@@ -154,9 +158,8 @@ def pair_of(sides):
 
 
 def planes_of(
-    path: Path, stack: Stack, pages: list[int] | None, channel: str | None,
-    crop: tuple[int, int, int, int] | None = None,
-) -> list[tuple[str, Plane]]:  # fmt: skip
+    path: Path, stack: Stack, pages: list[int] | None, channel: str | None, crop: Crop = None
+) -> list[tuple[str, Plane]]:
     """[(what is put behind the file's name, Plane)] of the pictures that are asked for.
 
     ``pages``: numbers from 1, none of them for all; ``channel``: a number, or a name that the file

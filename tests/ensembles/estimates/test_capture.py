@@ -15,7 +15,7 @@ from flocsim.ensembles.estimates.capture import (
     weighted,
 )
 from flocsim.ensembles.kind import study_of
-from flocsim.ensembles.report import kernel_lines, too_many_undecided, undecided_line
+from flocsim.ensembles.report import kernel_lines, too_many_undecided, verdict
 from flocsim.ensembles.runner import run
 from flocsim.io.results.kernel_group import ESTIMATES, WHAT
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
@@ -194,7 +194,7 @@ def test_a_study_cut_short_holds_the_rates_of_the_whole(tmp_path):
         assert np.all(there[name] <= here[f"{name}_high"]), name
     assert np.isnan(here["beta2"]).all() and here["alpha_high"].max() <= 1.0
     assert too_many_undecided(cut) and not too_many_undecided(whole)
-    assert "undecided" in undecided_line(cut) and undecided_line(whole) == ""
+    assert "undecided" in verdict(cut)[1] and verdict(whole)[1] == ""
     assert "[0.00, " in "\n".join(kernel_lines(cut.kernel, numerics=False))
 
 
