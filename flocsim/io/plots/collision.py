@@ -39,6 +39,8 @@ ENERGY_DECADES = 4
 """Decades of an axis of energies on either side of 0."""
 FORCE_COLOURS = (*style.BODY_COLOURS, "0.5", CONTACT_COLOUR)
 
+Values = Sequence[float]
+
 MILLISECONDS = 80
 """Of every frame of an animation."""
 
@@ -140,9 +142,7 @@ def strip_keys(names):
 
 
 @contextlib.contextmanager
-def over_time(
-    times: Sequence[float], label: str, title: str
-) -> Iterator[tuple[Any, np.ndarray, float]]:
+def over_time(times: Values, label: str, title: str) -> Iterator[tuple[Any, np.ndarray, float]]:
     """(axes of a new figure, times (k,) in a unit that suits them, that unit per second)."""
     unit, factor = time_unit(times)
     with drawing(WIDTH, 2.0) as figure:
@@ -153,9 +153,8 @@ def over_time(
 
 
 def draw_distance(
-    times: Sequence[float], centre_distance: Sequence[float], zone_distance: float = math.nan,
-    title: str = "",
-) -> Figure:  # fmt: skip
+    times: Values, centre_distance: Values, zone_distance: float = math.nan, title: str = ""
+) -> Figure:
     """The centre distance d_c against time, with D_0 where there is a zone; returns the Figure.
 
     ``times`` (k,) [s], ``centre_distance`` (k,) [m], ``zone_distance`` [m], NaN for none.
@@ -168,9 +167,8 @@ def draw_distance(
 
 
 def draw_forces(
-    times: Sequence[float], forces: Mapping[str, Sequence[float]], collision: float = math.nan,
-    title: str = "",
-) -> Figure:  # fmt: skip
+    times: Values, forces: Mapping[str, Values], collision: float = math.nan, title: str = ""
+) -> Figure:
     """Magnitudes of forces [N] against time [s], solid where they push apart; returns the Figure.
 
     ``forces``: {name: (k,)}, above 0 where a force pushes the bodies apart; ``collision``: the
@@ -195,9 +193,8 @@ def draw_forces(
 
 
 def draw_energies(
-    times: Sequence[float], work: Mapping[str, Sequence[float]], kinetic: Sequence[float],
-    title: str = "",
-) -> Figure:  # fmt: skip
+    times: Values, work: Mapping[str, Values], kinetic: Values, title: str = ""
+) -> Figure:
     """Work that each force has done since the start [J], and kinetic energies, against time [s].
 
     ``work``: {name: (k,)}; ``kinetic`` (k,), of all bodies together. Returns the Figure. Energies
@@ -232,7 +229,7 @@ def largest_of(curves):
 
 
 def write_animation(
-    path: str | Path, frames: Frames, motion: tuple[Sequence[float], Sequence[float]],
+    path: str | Path, frames: Frames, motion: tuple[Values, Values],
     zone_distance: float = math.nan, title: str = "", rule: Rule = False,
 ) -> None:  # fmt: skip
     """Write Frames as a GIF that loops.

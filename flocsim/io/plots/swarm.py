@@ -270,16 +270,15 @@ def shifts(place, reach, side, repeats):
     return (0.0, side if place < reach else -side)
 
 
-def write_swarm_animation(
-    path: str | Path, results: SwarmResults, replicate: int = 0, rule: Rule = False
-) -> None:
-    """Write a swarm at all its times as a GIF that loops; FileError if it cannot be written."""
-    outlines, pictures = outlines_of(results, replicate), []
-    width, height = results.groups["bodies"]["box"][replicate]
+def write_swarm_animation(path: str | Path, results: SwarmResults, rule: Rule = False) -> None:
+    """Write the first swarm at all its times as a GIF that loops; FileError if it cannot be
+    written."""
+    outlines, pictures = outlines_of(results, 0), []
+    width, height = results.groups["bodies"]["box"][0]
     for place in range(last_known(results) + 1):
         with drawing(4.0, min(max(4.0 * height / width, 2.0), 8.0) + 0.3) as figure:
             axes = figure.subplots()
-            draw_bodies(axes, results, replicate, place, outlines)
+            draw_bodies(axes, results, 0, place, outlines)
             time = results.scales["time"][place]
             axes.set(xlabel="x [µm]", ylabel="y [µm]", title=f"{time:.4g} s")
             figure.canvas.draw()
