@@ -121,7 +121,12 @@ def fit_mask(
     or too thin to inscribe a shape in, UsageError for a wrong option.
     """
     floc = _require_one_region(mask)
-    _check_options(vertices, radius, method)
+    if not isinstance(vertices, int | np.integer) or isinstance(vertices, bool) or vertices < 1:
+        raise UsageError(f"vertices must be a whole number of at least 1, found {vertices!r}")
+    if not is_number(radius) or radius <= 0:
+        raise UsageError(f"the spheroradius must be a number of pixels above 0, found {radius!r}")
+    if method not in METHODS:
+        raise UsageError(f"method must be {' or '.join(map(repr, METHODS))}, found {method!r}")
     if vertices == 1:
         return _equal_area_circle(floc)
     if inscribed and (method != "pattern" or preserve_area):
@@ -163,15 +168,6 @@ def _require_one_region(mask: object) -> np.ndarray:
     if regions != 1:
         raise ShapeError(f"a mask must hold one floc, found {regions} separate regions")
     return mask.astype(bool, order="C")
-
-
-def _check_options(vertices, radius, method):
-    if not isinstance(vertices, int | np.integer) or isinstance(vertices, bool) or vertices < 1:
-        raise UsageError(f"vertices must be a whole number of at least 1, found {vertices!r}")
-    if not is_number(radius) or radius <= 0:
-        raise UsageError(f"the spheroradius must be a number of pixels above 0, found {radius!r}")
-    if method not in METHODS:
-        raise UsageError(f"method must be {' or '.join(map(repr, METHODS))}, found {method!r}")
 
 
 def _equal_area_circle(mask):
@@ -296,12 +292,15 @@ def hole_ring(
 ) -> np.ndarray | None:  # fmt: skip
     """The ring (k, 2) [px], y up, of a hole, beside the outline and other ``rings``; None where
     none makes V less: the disk would close it, or walls are too thin for it."""
+    from scipy.ndimage import distance_transform_edt
+
     margin = int(np.ceil(2.0 * radius)) + 8
     inside = np.pad(hole.mask, margin)
-    open_pixels = int(hole.mask.sum())
-    best, least = None, open_pixels
+    away = distance_transform_edt(~inside)
+    best, least = None, int(hole.mask.sum())
     for reach in REACHES:
-        ring = ring_around(inside, hole.vertices, reach * radius)
+        # The points that tell most of what lies within the reach of the hole's pixels.
+        ring = telling_points(trace_outline(away <= reach * radius), hole.vertices)
         if not is_simple(ring):
             continue
         trials = [ring]
@@ -320,10 +319,3 @@ def hole_ring(
         if best is not None:
             break
     return best
-
-
-def ring_around(inside: np.ndarray, count: int, reach: float) -> np.ndarray:
-    """``count`` points that tell most of what lies within a reach [px] of a hole's pixels."""
-    from scipy.ndimage import distance_transform_edt
-
-    return telling_points(trace_outline(distance_transform_edt(~inside) <= reach), count)

@@ -112,26 +112,22 @@ def even_points(outline: np.ndarray, count: int) -> np.ndarray:
     return np.column_stack([np.interp(places, along, axis) for axis in closed.T])
 
 
-def ring_inside(mask: np.ndarray, count: int) -> np.ndarray:
-    """A regular polygon around the deepest pixel of the mask: a start that is always simple."""
-    from scipy.ndimage import distance_transform_edt
-
-    depth = distance_transform_edt(mask)
-    row, column = np.unravel_index(np.argmax(depth), depth.shape)
-    radius = max(0.5 * depth[row, column], 1.0, 0.01 * count)
-    angles = 2.0 * np.pi * np.arange(count) / count
-    return np.column_stack([column + radius * np.cos(angles), row + radius * np.sin(angles)])
-
-
 def inset(points: np.ndarray, mask: np.ndarray, depth: float) -> np.ndarray:
     """A simple polygon through the points, drawn in by `depth` [px] or less where it must.
 
     Points whose polygon is not simple are reordered, or a ring inside the mask takes their place.
     """
-    drawn = np.array(points)
+    from scipy.ndimage import distance_transform_edt
+
+    drawn, count = np.array(points), len(points)
     if simple_inset(drawn, depth):
         return drawn
-    drawn = ring_inside(mask, len(points))
+    # A regular polygon around the deepest pixel of the mask is always simple.
+    within = distance_transform_edt(mask)
+    row, column = np.unravel_index(np.argmax(within), within.shape)
+    radius = max(0.5 * within[row, column], 1.0, 0.01 * count)
+    angles = 2.0 * np.pi * np.arange(count) / count
+    drawn = np.column_stack([column + radius * np.cos(angles), row + radius * np.sin(angles)])
     simple_inset(drawn, depth)
     return drawn
 

@@ -113,14 +113,6 @@ def inside_polygon(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     return np.count_nonzero(straddles & (x < crossing), axis=1) % 2 == 1
 
 
-def inside_rings(points: np.ndarray, rings: Sequence[np.ndarray]) -> np.ndarray:
-    """Return which of the points (k, 2) lie inside a core with holes: an outer ring, then holes."""
-    found = inside_polygon(points, rings[0])
-    for ring in rings[1:]:
-        found = found ^ inside_polygon(points, ring)
-    return found
-
-
 class Part(NamedTuple):
     """A core swept by one disk.
 

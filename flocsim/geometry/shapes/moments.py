@@ -18,7 +18,7 @@ from flocsim.geometry.shapes.cores import (
     cross,
     edges_of,
     from_edges,
-    inside_rings,
+    inside_polygon,
     unit_edges,
 )
 
@@ -260,8 +260,9 @@ def covered(points, normals, after, part):
     least = np.sqrt(squared[np.arange(len(points)), nearest])
     # A point lies on the offset of its own part up to rounding, on that of others up to SHARED.
     depth = np.where(after == 0, ROUNDING * np.abs(points).max(initial=0.0), SHARED * part.radius)
-    # Covered: within the radius of the core, or inside its polygon.
-    found = (least < part.radius - depth) | inside_rings(points, part.rings)
+    # Covered: within the radius of the core, or inside its polygon, but not in a hole.
+    inside = np.logical_xor.reduce([inside_polygon(points, ring) for ring in part.rings])
+    found = (least < part.radius - depth) | inside
     if later.any():
         foot = offsets[np.arange(len(points)), nearest]
         shared = (least < (1.0 + SHARED) * part.radius) & later
