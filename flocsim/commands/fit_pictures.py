@@ -9,7 +9,7 @@ import sys
 import warnings
 import webbrowser
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -136,6 +136,8 @@ def fit_pictures(paths: Sequence[Path], options: Namespace) -> tuple[list[Pictur
             picture, region = regions[place]
             if isinstance(fits, Lost):
                 lost.setdefault(picture.name, fits.reason)
+            elif isinstance(fits, ShapeError):
+                report(f"{fits}; this floc is left out")
             else:
                 picture.fits[region.label] = fits
             progress.report(len(masks) - place - 1)
@@ -159,7 +161,10 @@ def error_limit(options: Namespace) -> float:
 
 
 def without_misfits(picture: Picture, limit: float) -> Picture:
-    """Return the Picture without the flocs whose fit at the largest N has a larger RE [%]."""
+    """Return the Picture without the flocs that could not be fitted, or whose fit at the largest N
+    has a larger RE [%]."""
+    labels = {each.label for each in picture.found.regions}
+    picture = without(picture, labels - set(picture.fits), "not fitted")
     bad = {
         each.label
         for each in picture.found.regions
@@ -167,19 +172,25 @@ def without_misfits(picture: Picture, limit: float) -> Picture:
         if min(picture.fits[each.label][0]) < each.equivalent_radius
         and picture.finest(each).relative_error > limit
     }
-    if not bad:
+    if bad:
+        count = len(picture.finest(picture.found.regions[0]).vertices)
+        report(
+            f"{picture.name}: {plural(len(bad), 'floc')} left out, as RE is above {limit:g} % at "
+            f"N = {count} (--max-error)"
+        )
+    return without(picture, bad, f"RE above {limit:g} %")
+
+
+def without(picture: Picture, labels: Collection[int], reason: str) -> Picture:
+    """Return the Picture without the flocs of these labels, which the table lists with a reason."""
+    if not labels:
         return picture
-    count = len(picture.finest(picture.found.regions[0]).vertices)
-    report(
-        f"{picture.name}: {plural(len(bad), 'floc')} left out, as RE is above {limit:g} % at "
-        f"N = {count} (--max-error)"
-    )
     flocs = [
-        each | {"choice": REJECT} if each["floc"] in bad else each
+        each | {"choice": REJECT} if each["floc"] in labels else each
         for each in picture.choices["flocs"]
     ]
     choices = {**picture.choices, "flocs": flocs}
-    found = chosen(picture.found, choices, f"RE above {limit:g} %")
+    found = chosen(picture.found, choices, reason)
     return attrs.evolve(picture, found=found, choices=choices)
 
 
@@ -272,8 +283,8 @@ def picture_of(
     return Picture(path, name, found, measures, size, choices, plane)
 
 
-def fit_region(task: tuple[str, Sequence[np.ndarray], Namespace]) -> list[Fits]:
-    """Return the Fits of each mask in (name, masks, options); ShapeError where there is none."""
+def fit_region(task: tuple[str, Sequence[np.ndarray], Namespace]) -> list[Fits] | ShapeError:
+    """Return the Fits of each mask in (name, masks, options), or why there is no fit."""
     name, masks, options = task
 
     def fit(mask: np.ndarray, radius: float, count: int) -> Fit:
@@ -293,8 +304,7 @@ def fit_region(task: tuple[str, Sequence[np.ndarray], Namespace]) -> list[Fits]:
                 for mask in masks
             ]
         except ShapeError as error:
-            message = f"{name}: {error}, or leave out small flocs with --min-radius"
-            raise ShapeError(message) from None
+            return ShapeError(f"{name}: {error}")
 
 
 def list_pictures(names: Sequence[str], masks: bool) -> list[Path]:

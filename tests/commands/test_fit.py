@@ -10,7 +10,7 @@ from PIL import Image
 
 from flocsim.__main__ import main
 from flocsim.commands import add_command, fit_pictures
-from flocsim.errors import FileError, ShapeError, UsageError
+from flocsim.errors import FileError, UsageError
 from flocsim.io.shape_library import read_library, read_settings
 from tests.helpers.choices import choose
 
@@ -323,14 +323,21 @@ def test_shapes_lie_inside_their_flocs_on_request(tmp_path, frame, capsys):
             run(frame, *options, "--inscribed", *more)
 
 
-def test_a_floc_too_thin_to_inscribe_a_shape_in_is_named(tmp_path, capsys):
+def test_a_floc_too_thin_to_inscribe_a_shape_in_is_left_out(tmp_path, capsys):
     mask = np.zeros((40, 50), np.uint8)
     mask[10, 5:40] = 255
-    np.savez(tmp_path / "thin.npz", one=mask)
     options = ("--pixel-size", "1e-6", "--vertices", "4", "--masks", "--min-radius", "1")
-    with pytest.raises(ShapeError, match=r"thin.npz:one#1: .* inside the floc .* --min-radius"):
-        run(tmp_path / "thin.npz", *options, "--inscribed", "-o", tmp_path / "s.h5")
+    options += ("--inscribed", "-o", tmp_path / "s.h5")
+    np.savez(tmp_path / "thin.npz", one=mask)
+    with pytest.raises(UsageError, match="nothing was fitted"):
+        run(tmp_path / "thin.npz", *options)
     assert not (tmp_path / "s.h5").exists()
+    mask[20:35, 5:25] = 255
+    np.savez(tmp_path / "both.npz", one=mask)
+    assert run(tmp_path / "both.npz", *options) == 0
+    assert re.search(r"both.npz:one#1: .* inside the floc .* left out", capsys.readouterr().err)
+    assert [entry.floc_id for entry in read_library(tmp_path / "s.h5")] == ["both.npz:one#2"]
+    assert "not fitted" in (tmp_path / "s.csv").read_text("utf-8")
 
 
 def test_the_median_of_frames_stands_for_the_light(tmp_path, capsys):
