@@ -42,10 +42,10 @@ def exceptions_figure(study, entries, vertices=64):
     return figure
 
 
-def flocs_against(study):
-    """(Counter of the names of flocs in contradicting pairs, how many pairs): a type and a
-    replicate are a pair, as its flocs are the same in all conditions of N > 1."""
-    flags = np.any([contradicting(study, number) for number in ALWAYS], axis=0)
+def flocs_against(study, claims=tuple(ALWAYS)):
+    """(Counter of the names of flocs in pairs that contradict these claims, how many pairs): a
+    type and a replicate are a pair, as its flocs are the same in all conditions of N > 1."""
+    flags = np.any([contradicting(study, number) for number in claims], axis=0)
     counts, pairs = Counter(), 0
     for kind, k in np.argwhere(flags.any(axis=(1, 2))):
         place = kind, *np.argwhere(flags[kind, ..., k])[-1], k

@@ -1,10 +1,10 @@
-"""Put the numbers and figures of a finished study into docs/evidence/reproduction.md.
+"""Put the numbers and figures of a finished study into docs/reproduction.md.
 
     python examples/tang2014/fill_page.py [--draw] DIR
 
 Every part ``<!-- name -->`` … ``<!-- end -->`` of the page is replaced by that of the same name in
 DIR's summary.md, sensitivity.md or plateau.md; parts without one stay. Figures that the page shows,
-../figures/tang2014-NAME, are copied from DIR/NAME. The words around them are for a person to check.
+figures/tang2014-NAME, are copied from DIR/NAME. The words around them are for a person to check.
 --draw first makes summary.md and the figures anew from the results in DIR, running nothing.
 """
 
@@ -16,10 +16,10 @@ from pathlib import Path
 
 import reproduce
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "evidence" / "reproduction.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "reproduction.md"
 SOURCES = ("summary.md", "sensitivity.md", "plateau.md")
 PART = re.compile(r"<!-- ([a-z-]+) -->\n.*?<!-- end -->", re.DOTALL)
-FIGURE = re.compile(r"\(\.\./figures/tang2014-([\w.-]+)\)")
+FIGURE = re.compile(r"\(figures/tang2014-([\w.-]+)\)")
 
 
 def parts_of(folder):
@@ -50,10 +50,7 @@ def draw(folder):
     names = ["tang2014", *tomllib.loads(reproduce.READINGS.read_text("utf-8"))]
     files = {name: reproduce.reading_file(folder, name) for name in names}
     readings = {name: path for name, path in files.items() if path.exists()}
-    library = folder / "errors.h5"
-    pages.write(
-        folder, load_config(reproduce.STUDY), library if library.exists() else None, readings
-    )
+    pages.write(folder, load_config(reproduce.STUDY), readings)
 
 
 def main():
@@ -70,7 +67,7 @@ def main():
     wanted = [match[1] for match in PART.finditer(text)]
     print("filled:", ", ".join(name for name in wanted if name in parts))
     print("as before:", ", ".join(name for name in wanted if name not in parts))
-    print("copied:", ", ".join(copy_figures(text, folder, PAGE.parents[1] / "figures")))
+    print("copied:", ", ".join(copy_figures(text, folder, PAGE.parent / "figures")))
 
 
 if __name__ == "__main__":

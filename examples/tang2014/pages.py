@@ -24,15 +24,11 @@ FLIPPED = {"4": ("zone", (0, 1, 2, 3)), "5": ("aggregation", (0, 1)), "6": ("agg
 """Figure → which flips are its numerical error, and among which classes."""
 
 
-def write(folder, config, library, readings):
-    """Write all of it into the folder.
-
-    ``config``: the study's; ``library``: with the errors of fits, or None; ``readings``: {name:
-    file}.
-    """
+def write(folder, config, readings):
+    """Write all of it into the folder; ``config``: the study's; ``readings``: {name: file}."""
     study = read_results(folder / "study.h5")
     changes = second_run_changes(study)
-    entries = read_library(library) if library else None
+    entries = library_of(folder, "errors.h5")
     draw_results(folder, study, changes)
     if entries:
         for name, figure in POPULATION_FIGURES.items():
@@ -43,8 +39,20 @@ def write(folder, config, library, readings):
     held = hold_readings(readings)
     if held:
         write_readings(folder / "readings.md", held)
-    findings = check_claims(study, entries, read_touches(folder / "several.csv"))
-    write_summary(folder, study, changes, findings, held, zones_of(config))
+    ways = {"flocsim": check_claims(study, entries, read_touches(folder / "several.csv"))}
+    if (folder / "study-paper.h5").exists():
+        errors = library_of(folder, "errors-paper.h5")
+        ways["the paper's finder and fit"] = check_claims(
+            read_results(folder / "study-paper.h5"), errors
+        )
+    clay = read_results(folder / "study-clay.h5")
+    ways["clay"] = check_claims(clay)
+    write_summary(folder, {"flocsim": study, "clay": clay}, changes, ways, held, zones_of(config))
+
+
+def library_of(folder, name):
+    """Return the entries of a shape library in the folder, None without."""
+    return read_library(folder / name) if (folder / name).exists() else None
 
 
 def zones_of(config):

@@ -3,8 +3,9 @@
     python examples/tang2014/reproduce.py --images DIR… --launch "mpirun -n 2"
     python examples/tang2014/reproduce.py --replicates 100               # synthetic flocs, reduced
 
-Each step shows its command and leaves its files in the output folder; what is finished is not done
-again, and what was interrupted goes on, so the same command resumes.
+The study runs with flocsim's way from picture to polygon, with the paper's own finder and fit, and
+with the preset clay. Each step shows its command and leaves its files in the output folder; what is
+finished is not done again, and what was interrupted goes on, so the same command resumes.
 """
 
 import argparse
@@ -16,7 +17,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import steps
-from output import paths_of
 
 HERE = Path(__file__).resolve().parent
 STUDY, READINGS = HERE / "study.toml", HERE / "readings.toml"
@@ -24,6 +24,9 @@ READING_VERTICES = (1, 4, 16, 64)
 ERROR_RADII = "1,2,4"
 ERROR_VERTICES = "4,8,16,28,40,52,64"
 """Of the fits for Fig. 3."""
+
+PAPER_FINDER, PAPER_FIT = ("--finder", "paper"), ("--method", "paper")
+"""Words of `flocsim fit` for the paper's way from picture to polygon."""
 
 
 def parse_arguments():
@@ -73,6 +76,9 @@ def fit_all(arguments, vertices):
     polygons = ",".join(str(n) for n in vertices if n > 1)
     fit(arguments, folder / "shapes.h5", polygons, "1")
     fit(arguments, folder / "errors.h5", ERROR_VERTICES, ERROR_RADII)
+    paper = PAPER_FIT if arguments.masks else (*PAPER_FINDER, *PAPER_FIT)
+    fit(arguments, folder / "shapes-paper.h5", polygons, "1", *paper)
+    fit(arguments, folder / "errors-paper.h5", ERROR_VERTICES, ERROR_RADII, *paper)
     if arguments.readings:
         few = ",".join(str(n) for n in READING_VERTICES if n > 1)
         fit(arguments, folder / "area.h5", few, "1", "--preserve-area")
@@ -117,6 +123,12 @@ def changes_of(arguments, vertices, more=None):
     return {"shapes": shapes} | more
 
 
+def ways_of(arguments):
+    """{name: changes} of the studies beside the main one; the paper's fits need images."""
+    paper = {"paper": {"shapes": {"file": "shapes-paper.h5"}}} if arguments.images else {}
+    return {**paper, "clay": {"preset": "clay"}}
+
+
 def readings_of(arguments):
     """{name: changes} of the readings that can be run: fits need images."""
     readings = tomllib.loads(READINGS.read_text("utf-8"))
@@ -141,11 +153,11 @@ def draw_trajectory(path, replicate, changes):
     """Fig. 7 for one replicate of Type I, N = 64, δ = 0: frames, distance, forces, animation."""
     if path.with_suffix(".gif").exists():
         return
-    strip, distance, forces = (paths_of(f"{path}{which}") for which in ("", "-distance", "-forces"))
+    strip, distance, forces = (f"{path}{which}.png" for which in ("", "-distance", "-forces"))
     flocsim(
         path.parent, path.stem, "trajectory", STUDY, *settings(changes),
         "--type", "I", "--vertices", 64, "--delta", 0, "--replicate", replicate,
-        "--output", *strip, "--distance", *distance, "--forces", *forces,
+        "--output", strip, "--distance", distance, "--forces", forces,
         "--animation", path.with_suffix(".gif"), "--overwrite",
     )  # fmt: skip
 
@@ -172,6 +184,9 @@ def main():
         fit_all(arguments, vertices)
     changes = changes_of(arguments, vertices)
     ensemble(arguments, folder / "study.h5", arguments.replicates, changes)
+    for name, more in ways_of(arguments).items():
+        own = changes_of(arguments, vertices, more)
+        ensemble(arguments, folder / f"study-{name}.h5", arguments.replicates, own)
     readings = run_readings(arguments) if arguments.readings else {}
     if not (folder / "several.csv").exists():
         swarms = "--swarms", arguments.swarms, "-o", folder
@@ -197,8 +212,7 @@ def write_pages(arguments, changes, readings):
     paths = [folder / f"figure-7-{name}" for name in examples]
     with ThreadPoolExecutor(arguments.jobs) as pool:
         list(pool.map(draw_trajectory, paths, examples.values(), [changes] * len(paths)))
-    library = folder / "errors.h5" if arguments.images else None
-    pages.write(folder, load_config(STUDY), library, readings)
+    pages.write(folder, load_config(STUDY), readings)
 
 
 if __name__ == "__main__":

@@ -1,13 +1,14 @@
-"""summary.md: all the numbers of a finished study that docs/evidence/reproduction.md shows."""
+"""summary.md: all the numbers of a finished study that docs/reproduction.md shows, and more."""
 
 import attrs
 import numpy as np
 import steps
 from claims.resampling import counts_of
 from claims.robust import ALWAYS, contradicting
-from claims.table import claims_table, verdicts_table
+from claims.table import changed_verdicts, claims_table, page_table
 from claims.trends import mean_of, with_delta
 from claims.verdicts import interval_of
+from exceptions import flocs_against
 from output import marked, write_page
 
 from flocsim.io.confidence import proportion
@@ -17,41 +18,59 @@ from flocsim.io.terminal import markdown_table
 FLIP_KINDS = ("outcome", "aggregation", "zone")
 MOST_FLIPS, MOST_UNDECIDED = 0.5, 0.1
 """Goals [%]: outcome flips among the replicates run again, undecided among all."""
+MOST_NAMED = 3
+"""Flocs that are named of those whose pairs contradict a claim."""
+HEADLINES = (6, 8, 12, 13, 15, 16, 18, 19)
+"""Claims that carry the paper's headline, held against flocs of real weight."""
 MOST_OPEN = 1.0
 """Share [%] of a reading's collisions without an outcome that needs a word of caution."""
 BESIDE = {"pr_inside": "Pr[C inside]", "pr_a_inside": "Pr[A|inside]",
          "pr_a_outside": "Pr[A|outside]"}  # fmt: skip
 
 
-def write_summary(folder, study, changes, findings, readings, zones):
-    """Write the page: each part stands between marks, as in docs/evidence/reproduction.md.
+def write_summary(folder, studies, changes, ways, readings, zones):
+    """Write the page: each part stands between marks, as in docs/reproduction.md.
 
-    ``findings``: of all claims; ``readings``: {name: (Results, Findings about collisions)};
-    ``zones``: {type: D_0 [m]}.
+    ``studies``: {name: Results}, flocsim's and clay's; ``ways``: {name: Findings of all claims},
+    flocsim's, the paper's own and clay's; ``readings``: {name: (Results, Findings about
+    collisions)}; ``zones``: {type: D_0 [m]}.
     """
+    study, clay = studies["flocsim"], studies["clay"]
+    fitted = {name: found for name, found in ways.items() if name != "clay"}
+    headline = {"tang2014": ways["flocsim"], "clay": ways["clay"]}
     parts = {
-        "times": times(folder, study),
+        "run": run_text(study),
+        "times": times(folder),
         "totals": totals(study),
+        "totals-clay": totals(clay),
         "flips": flips_table(changes),
-        "claims": claims_table(findings),
-        "against": against(study, zones),
+        "claims": page_table(fitted),
+        "clay": page_table(headline, HEADLINES, quoted=False),
+        "against": against(study),
+        "exceptions": exceptions(study, zones),
         "beside": beside_table(study),
     }
+    parts |= {f"in-full, {name}": claims_table(found) for name, found in ways.items()}
     if readings:
-        parts["readings"] = verdicts_table({name: found for name, (_, found) in readings.items()})
+        parts["readings"] = changed_verdicts({name: each for name, (_, each) in readings.items()})
         parts["reading-totals"] = readings_totals(readings)
     path = folder / "summary.md"
     write_page(path, "\n\n".join(marked(*part) for part in parts.items()) + "\n")
     print(path)
 
 
-def times(folder, study):
-    """Wall time of every step, and where and on what the study ran."""
-    run = study.run
+def times(folder):
+    """Wall time of every step."""
     goes = steps.taken(folder / "steps.csv")
     rows = [(name, f"{sum(each):.0f}", len(each)) for name, each in goes.items()]
     rows.append(("all", f"{sum(sum(each) for each in goes.values()):.0f}", ""))
-    where = (
+    return markdown_table(("step", "wall time [s]", "goes"), rows)
+
+
+def run_text(study):
+    """Where and on what the study ran."""
+    run = study.run
+    return (
         f"**{study.count} replicates in each of {np.prod(study.shape)} conditions.** "
         f"flocsim {run['flocsim_version']}, {run['date']}, {run['processor']}, Python "
         f"{run['python_version']}, numpy {run['numpy_version']}, numba {run['numba_version']}. The "
@@ -59,7 +78,6 @@ def times(folder, study):
         f"replicates in {run['wall_time']:.0f} s, "
         f"{run['computed'] / max(run['wall_time'], 1e-9):.0f} a second."
     )
-    return f"{where}\n\n{markdown_table(('step', 'wall time [s]', 'goes'), rows)}"
 
 
 def totals(study):
@@ -95,7 +113,22 @@ def flips_table(changes):
     return f"{markdown_table(heads, rows)}\n\nOutcome flips (goal: at most {MOST_FLIPS} %): {flag}."
 
 
-def against(study, zones):
+def against(study):
+    """How many replicates contradict each claim about every collision, and their flocs."""
+    rows = []
+    for number in ALWAYS:
+        flags = contradicting(study, number)
+        counts, pairs = flocs_against(study, (number,))
+        often = ", ".join(f"{name} ({times})" for name, times in counts.most_common(MOST_NAMED))
+        if pairs:
+            rows.append((number, np.count_nonzero(flags), pairs, often))
+    heads = ("claim", "replicates against it", "pairs of flocs", "flocs in most of these pairs")
+    return (
+        markdown_table(heads, rows) if rows else "No replicate contradicts (6), (7), (9) or (10)."
+    )
+
+
+def exceptions(study, zones):
     """The replicates that contradict a claim about every collision, one row each."""
     heads = ("claims", "type", "replicate", "flocs i, j", "conditions", "N", "δ", "d_c / D_0")
     numbers = {}
@@ -103,9 +136,7 @@ def against(study, zones):
         for row in rows_against(study, zones, number):
             numbers.setdefault(row, []).append(str(number))
     rows = [(", ".join(each), *row) for row, each in numbers.items()]
-    return (
-        markdown_table(heads, rows) if rows else "No replicate contradicts (6), (7), (9) or (10)."
-    )
+    return markdown_table(heads, rows)
 
 
 def rows_against(study, zones, number):

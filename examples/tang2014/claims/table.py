@@ -1,6 +1,8 @@
-"""The claims as a table in Markdown: every part with its value, interval and verdict."""
+"""The claims as tables in Markdown: in full, in a row for each, and by reading."""
 
 from flocsim.io.terminal import markdown_table
+
+from .sentences import SENTENCES
 
 
 def number_text(value):
@@ -38,13 +40,46 @@ def claims_table(findings):
     return markdown_table(heads, [row for finding in findings for row in rows_of(finding)])
 
 
-def verdicts_table(readings):
-    """Claims against readings: ``readings`` is {name: Findings}; cells are verdicts."""
-    first = next(iter(readings.values()))
+def deciding_part(finding):
+    """Return the index of the first Part that has the verdict of its Finding."""
+    return [part.verdict for part in finding.parts].index(finding.verdict)
+
+
+def part_text(finding, index):
+    """Return "value [low, high], **verdict**": of one Part, and of the whole Finding."""
+    if not finding.parts:
+        return "–"
+    part = finding.parts[index]
+    return f"{number_text(part.value)} {interval_text(part)}, **{finding.verdict}**"
+
+
+def page_table(ways, numbers=None, quoted=True):
+    """Return a table with a row for each claim, in the statistic that decides it the first way.
+
+    ``ways`` is {name: Findings}; ``numbers``: the claims shown, all by default; ``quoted``: give
+    the paper's words, too.
+    """
+    columns = [{found.number: found for found in findings} for findings in ways.values()]
     rows = []
-    for place, finding in enumerate(first):
-        verdicts = [
-            found[place].verdict if found[place].parts else "-" for found in readings.values()
-        ]
-        rows.append((f"{finding.number} {finding.claim}", *verdicts))
-    return markdown_table(("claim", *readings), rows)
+    for number, finding in columns[0].items():
+        if (numbers is None or number in numbers) and finding.parts:
+            index = deciding_part(finding)
+            others = len(finding.parts) - 1
+            more = f" (and {others} more)" if others else ""
+            cells = [part_text(found[number], index) for found in columns]
+            claim = [SENTENCES[number], finding.claim] if quoted else [finding.claim]
+            rows.append((number, *claim, finding.parts[index].what + more, *cells))
+    heads = ["the paper", "read as"] if quoted else ["claim"]
+    return markdown_table(("", *heads, "statistic that decides", *ways), rows)
+
+
+def changed_verdicts(readings):
+    """Return a table of the verdicts that differ from those of the first of {name: Findings}."""
+    own, *others = readings.items()
+    verdicts = {finding.number: finding.verdict for finding in own[1]}
+    rows = []
+    for name, findings in others:
+        changed = [f"({found.number}) {found.verdict}" for found in findings
+                   if found.verdict != verdicts[found.number]]  # fmt: skip
+        rows.append((name, ", ".join(changed) or "none"))
+    return markdown_table(("reading", f"verdicts other than under {own[0]}"), rows)

@@ -6,7 +6,8 @@ import pytest
 
 from examples.tang2014.claims import check_claims
 from examples.tang2014.claims.robust import contradicting
-from examples.tang2014.claims.table import verdicts_table
+from examples.tang2014.claims.sentences import SENTENCES
+from examples.tang2014.claims.table import changed_verdicts, page_table
 from tests.helpers.paper_like import DELTA, VERTICES, paper_fits, paper_results, relabelled
 
 
@@ -181,9 +182,22 @@ def test_too_few_replicates_decide_nothing():
     assert set(verdicts(first_replicates(29)).values()) == {"undecided"}
 
 
-def test_the_table_of_readings_has_a_column_each():
-    readings = {"one": check_claims(paper_results()), "other": check_claims(None, paper_fits())}
-    lines = verdicts_table(readings).splitlines()
-    assert lines[0] == "| claim | one | other |"
-    assert lines[2].endswith("| - | holds |")
+def test_the_table_of_the_page_shows_what_decides_each_claim():
+    ways = {
+        "one": check_claims(paper_results(bound_outside), paper_fits(), first_touches()),
+        "other": check_claims(paper_results()),
+    }
+    lines = page_table(ways).splitlines()
     assert len(lines) == 2 + 26
+    assert lines[2].endswith("**holds** | – |") and SENTENCES[1] in lines[2]
+    (outside,) = [line for line in lines if line.startswith("| 15 |")]
+    assert "**fails**" in outside and "**holds**" in outside
+    assert len(page_table(ways, numbers=(6, 8), quoted=False).splitlines()) == 2 + 2
+
+
+def test_readings_show_where_their_verdicts_differ():
+    readings = {"tang2014": check_claims(paper_results()), "alike": check_claims(paper_results()),
+                "other": check_claims(paper_results(small_outside))}  # fmt: skip
+    assert changed_verdicts(readings).splitlines()[2:] == [
+        "| alike | none |", "| other | (7) fails, (10) fails |"
+    ]  # fmt: skip
