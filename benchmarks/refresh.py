@@ -2,7 +2,9 @@
 
     python -m benchmarks.refresh [--only NAME …] [--quick]
 
-A block ``<!-- NAME: command -->`` … ``<!-- end -->`` holds what the command printed.
+A block ``<!-- NAME: command -->`` … ``<!-- end -->`` holds what the command printed. A block that
+was made at this commit stays, unless it is named, so that an interrupted call goes on. The pictures
+that some commands need lie in the folder images (docs/images.md lists them).
 """
 
 import argparse
@@ -10,8 +12,9 @@ import re
 import shlex
 import subprocess
 import sys
+import time
 
-from benchmarks.reporting import ROOT
+from benchmarks.reporting import ROOT, commit
 
 PAGES = sorted((ROOT / "docs" / "evidence").glob("*.md"))
 BLOCK = re.compile(r"(<!-- (\w+): (python [^>]*?) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -26,16 +29,24 @@ def printed(command, quick):
     return f"\n```\n{heading}\n```\n\n{tables.strip()}\n\n"
 
 
-def refreshed(text, only, quick):
-    """The page's text with the blocks of these names (all, if none are given) made anew."""
+def is_fresh(block, quick):
+    """Return True if a block was made at this commit, by a full run unless a quick one is meant."""
+    return f"commit {commit()}:" in block and (quick or "--quick" not in block)
 
-    def replace(match):
-        if only and match[2] not in only:
-            return match[0]
-        print(f"{match[2]}: {match[3]}", file=sys.stderr)
-        return f"{match[1]}{printed(match[3], quick)}{match[4]}"
 
-    return BLOCK.sub(replace, text)
+def refresh(page, only, quick):
+    """Make anew the blocks of a page that are not fresh, or those of these names; after each of
+    them the page is written."""
+    for name in [match[2] for match in BLOCK.finditer(page.read_text("utf-8"))]:
+        text = page.read_text("utf-8")
+        match = next(each for each in BLOCK.finditer(text) if each[2] == name)
+        if name not in only if only else is_fresh(match[0], quick):
+            continue
+        print(f"{name}: {match[3]}", file=sys.stderr, flush=True)
+        began = time.monotonic()
+        block = f"{match[1]}{printed(match[3], quick)}{match[4]}"
+        page.write_text(text[: match.start()] + block + text[match.end() :], "utf-8")
+        print(f"{name}: {time.monotonic() - began:.0f} s", file=sys.stderr, flush=True)
 
 
 def main():
@@ -45,8 +56,7 @@ def main():
     parser.add_argument("--quick", action="store_true")
     arguments = parser.parse_args()
     for page in PAGES:
-        text = refreshed(page.read_text("utf-8"), arguments.only, arguments.quick)
-        page.write_text(text, "utf-8")
+        refresh(page, arguments.only, arguments.quick)
 
 
 if __name__ == "__main__":

@@ -21,10 +21,19 @@ EXAMPLES = ROOT / "examples"
 PACKAGES = ("numba", "llvmlite", "numpy", "scipy")
 
 
+MEASURED = ("flocsim", "benchmarks", "examples")
+"""Folders whose files decide what a benchmark prints."""
+
+
 def commit():
-    """The commit that is measured, "-dirty" where files differ from it."""
-    command = ["git", "-C", str(ROOT), "describe", "--always", "--dirty"]
-    return subprocess.run(command, capture_output=True, text=True).stdout.strip() or "unknown"
+    """The last commit that changed what is measured, "-dirty" where files differ from it."""
+
+    def git(*words):
+        command = ["git", "-C", str(ROOT), *words, "--", *MEASURED]
+        return subprocess.run(command, capture_output=True, text=True).stdout.strip()
+
+    last = git("log", "-1", "--format=%h") or "unknown"
+    return last + "-dirty" * bool(git("status", "--porcelain", "--untracked-files=no"))
 
 
 def installed(packages):

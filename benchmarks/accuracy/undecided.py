@@ -9,6 +9,8 @@ that gives nan at chosen orientations of i (nan). The truth is what the large st
 95 % intervals of each probability, efficiency and rate hold it in 95 % of the small studies.
 """
 
+import sys
+
 import numpy as np
 
 from benchmarks.reporting import EXAMPLES, Table, begin
@@ -170,9 +172,12 @@ def main():
                         counts[what] += held_by(each, truth[what])
                 for what, (held, of) in counts.items():
                     shown.setdefault(what, []).append(100.0 * held / of if of else np.nan)
-        for what, values in shown.items():
-            table.add(name, what, *values)
-            least = min(least, np.nanmin(values[2:]))
+        values = np.array(list(shown.values()))
+        table.add(name, "least of them", *np.nanmin(values, axis=0).tolist())
+        table.add(name, "mean of them", *np.nanmean(values, axis=0).tolist())
+        worst = list(shown)[int(np.argmin(np.nanmin(values[:, 2:], axis=1)))]
+        print(f"{name}: {worst} is held least often", file=sys.stderr)
+        least = min(least, np.nanmin(values[:, 2:]))
     table.print()
     print(f"least with undecided ones: {least:.1f} % (goal: {GOAL:g} %: "
           f"{'reached' if least >= GOAL else 'not reached'})")  # fmt: skip
