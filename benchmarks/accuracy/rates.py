@@ -83,8 +83,10 @@ def print_kernels(kernel):
 
 def print_text(title, text):
     """Print lines of a command as they are, without those of single replicates and files."""
-    lines = [each for each in text.strip().splitlines()
-             if not each.startswith("replicate ") and not each.endswith((".h5", ".png"))]  # fmt: skip
+    lines = [
+        each for each in text.strip().splitlines()
+        if not each.startswith("replicate ") and not each.endswith((".h5", ".png"))
+    ]  # fmt: skip
     print("\n".join([f"**{title}**\n", "```", *lines, "```\n"]))
 
 
@@ -98,9 +100,10 @@ def main():
         folder = Path(name)
         for each in CONFIGS:
             shutil.copy(EXAMPLES / each, folder)
-        flocsim(folder, "fit", *(Path(pictures).resolve() / each for each in ("flocpy", "safas")),
-                "--pixel-size", "0.95e-6", "--vertices", "16,32", "--radius", "1",
-                "--max-blur", "inf", "--neck", "0", *jobs, "-o", "real_flocs_shapes.h5")  # fmt: skip
+        images = [pictures.resolve() / each for each in ("flocpy", "safas")]
+        flocsim(folder, "fit", *images, "--pixel-size", "0.95e-6", "--vertices", "16,32",
+                "--radius", "1", "--max-blur", "inf", "--neck", "0", *jobs,
+                "-o", "real_flocs_shapes.h5")  # fmt: skip
         flocsim(folder, "kernel", "kernel.toml", *few, *jobs)
         print_kernels(read_results(folder / "kernel.h5").kernel)
         flocsim(folder, "plot", "kernel.h5")

@@ -3,7 +3,7 @@
     python examples/tang2014/fill_page.py [--draw] DIR
 
 Every part ``<!-- name -->`` … ``<!-- end -->`` of the page is replaced by that of the same name in
-DIR's summary.md, sensitivity.md or plateau.md; parts without one stay. Figures that the page shows,
+DIR's summary.md; parts without one stay. Figures that the page shows,
 figures/tang2014-NAME, are copied from DIR/NAME. The words around them are for a person to check.
 --draw first makes summary.md and the figures anew from the results in DIR, running nothing.
 """
@@ -17,15 +17,15 @@ from pathlib import Path
 import reproduce
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reproduction.md"
-SOURCES = ("summary.md", "sensitivity.md", "plateau.md")
+SOURCE = "summary.md"
 PART = re.compile(r"<!-- ([a-z-]+) -->\n.*?<!-- end -->", re.DOTALL)
 FIGURE = re.compile(r"\(figures/tang2014-([\w.-]+)\)")
 
 
 def parts_of(folder):
-    """{name: part with its marks} of the files in a folder."""
-    texts = [(folder / name).read_text("utf-8") for name in SOURCES if (folder / name).exists()]
-    return {match[1]: match[0] for text in texts for match in PART.finditer(text)}
+    """{name: part with its marks} of the summary in a folder."""
+    text = (folder / SOURCE).read_text("utf-8")
+    return {match[1]: match[0] for match in PART.finditer(text)}
 
 
 def filled(text, parts):

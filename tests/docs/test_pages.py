@@ -32,11 +32,8 @@ NOT_RUN = {
     "docs/cluster.md": "one study, started in four ways, three of which need a machine for them",
     "docs/kernels.md": "1,024 points of each pair of classes: many minutes",
     "docs/presets.md": "a sweep of a study that is the reader's",
+    "docs/reproduction.md": "an hour",
     "docs/evidence/accuracy.md": "benchmarks: minutes to hours",
-    "docs/evidence/kernels.md": "a quarter of an hour",
-    "docs/evidence/real_flocs.md": "minutes to hours, on pictures that are not in the repository",
-    "docs/evidence/reproduction.md": "hours",
-    "docs/evidence/strength.md": "8.5 min of CPU time, on a study that is the reader's",
     "docs/strength.md": "minutes, on a study that is the reader's",
     "docs/tutorial.md": "run as a notebook by test_tutorial.py",
 }

@@ -57,7 +57,7 @@ TRIES = ((1e-11, 2_000), (1e-10, 2_000), (1e-9, 8_000), (1e-8, 20_000))
 """(tolerance [m], steps tried at most) of a run, and of those made in its place where it has not
 ended by then. The first is far below the gap at which attraction gives way, and most runs try a few
 hundred steps. Edges that slide over each other near the rate at which they open may bounce by
-1e-15 m, tens of thousands of times; coarser steps go over that (docs/evidence/strength.md)."""
+1e-15 m, tens of thousands of times; coarser steps go over that (docs/strength.md)."""
 
 
 class Opening(NamedTuple):
