@@ -5,6 +5,9 @@ listed pair.
 """
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from flocsim.geometry.contact.candidates import (
     outline_speed,
@@ -18,7 +21,16 @@ from flocsim.integrators.events.crossings import any_too_deep
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.rhs.forces import locate_with_slip_rates, sum_forces
 from flocsim.integrators.rhs.views import inertia
-from flocsim.state.work import NOW
+from flocsim.state.scene import Scene
+from flocsim.state.work import NOW, Work
+
+
+class Given(NamedTuple):
+    """What all functions of this module work on; a solver calls them with a table of it."""
+
+    scene: Scene
+    work: Work
+    observed: np.ndarray  # the observer's array
 
 
 def read_state(work, vector):
@@ -32,8 +44,9 @@ def read_state(work, vector):
         work.slip[NOW, row] = vector[6 * bodies + row]
 
 
-def rate_state(scene, work, time, vector, rates):
+def rate_state(given, time, vector, rates):
     """Derivative of a state vector by time, every listed pair flagged as it is there."""
+    scene, work = given[0].scene, given[0].work
     read_state(work, vector)
     locate_with_slip_rates(scene, work, NOW)
     sum_forces(scene, work, time, NOW)
@@ -68,8 +81,9 @@ def longest_step(scene, work):
     return 0.5 * work.budget[0] / max(speed, 1e-12)
 
 
-def list_anew(scene, work):
+def list_anew(given):
     """Hand displacements on, list the pairs; the longest step for this list, −1 without room."""
+    scene, work = given[0].scene, given[0].work
     locate_now(scene, work)
     transfer_slips(scene, work)
     if not rebuild_list_ahead(scene, work, LISTED_FOR):
@@ -78,11 +92,12 @@ def list_anew(scene, work):
     return longest_step(scene, work)
 
 
-def inspect(scene, work, observed, time, vector, watch):
+def inspect(given, time, vector, watch):
     """(share of the list's budget spent, a pair with slip has opened, least gap, too deep, code).
 
     The code is the observer's if it is to ``watch``, else 0.
     """
+    scene, work, observed = given[0].scene, given[0].work, given[0].observed
     read_state(work, vector)
     least = locate_now(scene, work) if work.tally.candidates > 0 else math.inf
     opened = False

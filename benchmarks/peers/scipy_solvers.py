@@ -12,8 +12,9 @@ import numpy as np
 from scipy.integrate import BDF, LSODA, Radau
 from scipy.optimize import brentq
 
-from benchmarks.peers.compiled import inspect, list_anew, rate_state
+from benchmarks.peers.compiled import Given, inspect, list_anew, rate_state
 from benchmarks.speed.measure import Measured
+from flocsim.compiler.by_pointer import Stacked, table_of
 from flocsim.constants import WATER_VISCOSITY
 from flocsim.integrators import VelocityVerlet
 from flocsim.state.work import NOW, motion_of, with_room, work_of
@@ -51,6 +52,8 @@ class SciPyRun:
     evaluations: int = 0
     work: object = None
     scene: object = None
+    observed: object = None
+    given: object = None
 
     def __attrs_post_init__(self):
         self.system = attrs.evolve(self.system, integrator=VelocityVerlet())
@@ -63,13 +66,20 @@ class SciPyRun:
         # Radau hands over rows of a transposed array; the compiled code takes contiguous ones.
         vector = np.ascontiguousarray(vector)
         rates = np.empty_like(vector)
-        self.pieces[0](self.scene, self.work, time, vector, rates)
+        self.pieces[0](self.given, time, vector, rates)
         return rates
+
+    def bind(self):
+        """Make the table of the arrays that all calls hand over: a solver makes thousands."""
+        one = Given(self.scene, self.work, self.observed)
+        words, kinds = table_of(one)
+        self.given = Stacked(np.frombuffer(words, np.int64)[None].copy(), (Given, *kinds), one)
 
     def make_list(self):
         """(state vector, longest step) with the pairs listed anew."""
-        while (longest := self.pieces[1](self.scene, self.work)) < 0.0:
+        while (longest := self.pieces[1](self.given)) < 0.0:
             self.work = with_room(self.work)
+            self.bind()
         slips = self.work.slip[NOW, : self.work.tally.candidates]
         return np.concatenate([motion_of(self.work, NOW).ravel(), slips]), longest
 
@@ -85,41 +95,46 @@ class SciPyRun:
             first_step=min(step, largest),
         )  # fmt: skip
 
-    def touch(self, solver, observed):
+    def touch(self, solver):
         """Show the observer the instant inside the last step at which the outlines touched."""
         path = solver.dense_output()
 
         def gap(time):
-            return self.inspect(time, path(time), observed, False)[2]
+            return self.inspect(time, path(time), False)[2]
 
         low, high = solver.t_old, solver.t
         if gap(low) > 0.0 > gap(high):
             high = brentq(gap, low, high, xtol=1e-15 * high, rtol=1e-14)
             high += 1e-13 * high if gap(high) >= 0.0 else 0.0
-        return self.inspect(high, path(high), observed, True)[4]
+        return self.inspect(high, path(high), True)[4]
 
     def prepare(self, work, observed):
         """Arrays for a run; everything compiled beforehand."""
         self.scene = self.system.scene()
         self.work = work or work_of(self.scene, *self.system.motion())
         self.evaluations = 0
+        # Compile with a copy: the observer has not seen anything yet.
+        self.observed = observed.copy()
+        self.bind()
         vector, _ = self.make_list()
         self.rate(0.0, vector)
-        self.inspect(0.0, vector, observed.copy(), True)
+        self.inspect(0.0, vector, True)
+        self.observed = observed
+        self.bind()
 
-    def inspect(self, time, vector, observed, watch):
+    def inspect(self, time, vector, watch):
         """See peers.compiled.inspect."""
-        return self.pieces[2](self.scene, self.work, observed, time, vector, watch)
+        return self.pieces[2](self.given, time, np.ascontiguousarray(vector), watch)
 
-    def advance(self, solver, observed, apart):
+    def advance(self, solver, apart):
         """One step: (status or "", observer's code, whether the list must be made anew, apart)."""
         solver.step()
         if solver.status == "failed" or not np.isfinite(solver.y).all():
             return "SOLVER_FAILED", 0, False, apart
-        spent, opened, least, deep, code = self.inspect(solver.t, solver.y, observed, False)
+        spent, opened, least, deep, code = self.inspect(solver.t, solver.y, False)
         if apart and least < 0.0:
-            apart, code = False, self.touch(solver, observed)
-        code = code or self.inspect(solver.t, solver.y, observed, True)[4]
+            apart, code = False, self.touch(solver)
+        code = code or self.inspect(solver.t, solver.y, True)[4]
         status = "STOPPED" if code else "TOO_DEEP" if deep else ""
         return status, code, opened or spent > 0.5, apart
 
@@ -130,7 +145,7 @@ class SciPyRun:
         began, steps, code, apart, status = time.process_time(), 0, 0, True, ""
         solver = self.start_solver(method, 0.0, until, tolerance, FIRST_STEP)
         while not status and solver.t < until:
-            status, code, anew, apart = self.advance(solver, observed, apart)
+            status, code, anew, apart = self.advance(solver, apart)
             steps += 1
             if anew and not status and solver.t < until:
                 step = max(solver.t - solver.t_old, 1e-12)
