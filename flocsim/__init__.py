@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from flocsim.system import System
     from flocsim.trajectories.trajectory import State, Trajectory
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 HOMES = {
     "Body": "body",

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from flocsim import Body, System
+from flocsim.compiler import composer
 from flocsim.constants import CENTRE_SOFTENING
 from flocsim.forces import VanDerWaals
 from flocsim.integrators.rhs import views
@@ -51,6 +52,7 @@ def test_no_outcome_hangs_on_the_softening(tmp_path, monkeypatch):
     found = []
     for factor in (1.0, 10.0, 0.1):
         monkeypatch.setattr(views, "CENTRE_SOFTENING", factor * CENTRE_SOFTENING)
+        monkeypatch.setattr(composer, "_composed", {})
         study = small_study(tmp_path, {"scene": scene, "replicates": 10})
         found.append([OUTCOMES[study.run(place, n, share, k)["outcome"]] for place in range(3)
                       for n in (4, 16) for share in (0.0, 0.3, 0.7) for k in range(5)])  # fmt: skip
