@@ -33,7 +33,8 @@ file = "study{number}.h5"
 
 REPORT = (
     "import json, resource, sys; from flocsim.__main__ import main; "
-    "code = main(['ensemble', *sys.argv[1:]]); size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss; "
+    "code = main(['ensemble', *sys.argv[1:]]); "
+    "size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss; "
     "print(json.dumps(['peak', size])); sys.exit(code)"
 )
 
