@@ -183,8 +183,6 @@ def without_misfits(picture: Picture, limit: float) -> Picture:
 
 def without(picture: Picture, labels: Collection[int], reason: str) -> Picture:
     """Return the Picture without the flocs of these labels, which the table lists with a reason."""
-    if not labels:
-        return picture
     flocs = [
         each | {"choice": REJECT} if each["floc"] in labels else each
         for each in picture.choices["flocs"]

@@ -47,11 +47,10 @@ def compose(
         return linked
     refuse_no_compiler()
     name = f"flocsim_scene_{fingerprint(entry, fillings, options_text(), linked)}"
-    if name not in _composed:
-        _composed[name] = Engine(linked, name, what)
+    engine = _composed.setdefault(name, Engine(linked, name, what))
     if all(str(each.__module__).startswith("flocsim.") for each in (entry, *fillings.values())):
-        _composed[key] = _composed[name]
-    return _composed[name]
+        _composed[key] = engine
+    return engine
 
 
 @functools.cache

@@ -61,11 +61,6 @@ class Record(Element):
         copy: Self = found[0]
         return copy
 
-    def become(self, other: Self) -> None:
-        """Take over the values of another record."""
-        array: Any = self.base
-        array[0] = other
-
     @classmethod
     def rows(cls, *shape: int) -> Any:
         """Return an array of records of zeros."""
