@@ -29,7 +29,7 @@ def journal(request, tmp_path_factory):
     make = small_config if request.param == "pairs" else swarm_config
     config = make(folder, SPHERES) if request.param == "pairs" else make(folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("flocsim.ensembles.runner.make_results", lambda *_: 1 / 0)
+        patch.setattr("flocsim.ensembles.runner.facts", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             run_to_file(config, Communicator(), folder / "r.h5", NEW)
     return config, folder / "r.h5.journal"
