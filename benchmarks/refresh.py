@@ -1,6 +1,6 @@
 """Run the benchmarks and put their tables into the pages of docs/evidence/, each between its marks.
 
-    python -m benchmarks.refresh [--only NAME …] [--quick]
+    python -m benchmarks.refresh [--pages PAGE …] [--only NAME …] [--quick]
 
 A block ``<!-- NAME: command -->`` … ``<!-- end -->`` holds what the command printed. A block that
 was made at this commit stays, unless it is named, so that an interrupted call goes on. The pictures
@@ -37,26 +37,35 @@ def is_fresh(block, quick):
 def refresh(page, only, quick):
     """Make anew the blocks of a page that are not fresh, or those of these names; after each of
     them the page is written."""
-    for name in [match[2] for match in BLOCK.finditer(page.read_text("utf-8"))]:
-        text = page.read_text("utf-8")
-        match = next(each for each in BLOCK.finditer(text) if each[2] == name)
-        if name not in only if only else is_fresh(match[0], quick):
+    for _, name, command, _ in BLOCK.findall(page.read_text("utf-8")):
+        if name not in only if only else is_fresh(block_of(page, name)[0], quick):
             continue
-        print(f"{name}: {match[3]}", file=sys.stderr, flush=True)
-        began = time.monotonic()
-        block = f"{match[1]}{printed(match[3], quick)}{match[4]}"
+        print(f"{name}: {command}", file=sys.stderr, flush=True)
+        began, table = time.monotonic(), printed(command, quick)
+        # The page may have been edited meanwhile.
+        match = block_of(page, name)
+        text = match.string
+        block = f"{match[1]}{table}{match[4]}"
         page.write_text(text[: match.start()] + block + text[match.end() :], "utf-8")
         print(f"{name}: {time.monotonic() - began:.0f} s", file=sys.stderr, flush=True)
+
+
+def block_of(page, name):
+    """Return the match of the block of a page that has this name."""
+    text = page.read_text("utf-8")
+    return next(each for each in BLOCK.finditer(text) if each[2] == name)
 
 
 def main():
     """Refresh the pages."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME")
+    parser.add_argument("--pages", nargs="+", default=[each.stem for each in PAGES], metavar="PAGE")
     parser.add_argument("--quick", action="store_true")
     arguments = parser.parse_args()
     for page in PAGES:
-        refresh(page, arguments.only, arguments.quick)
+        if page.stem in arguments.pages:
+            refresh(page, arguments.only, arguments.quick)
 
 
 if __name__ == "__main__":
