@@ -21,15 +21,11 @@ EXAMPLES = ROOT / "examples"
 PACKAGES = ("numba", "llvmlite", "numpy", "scipy")
 
 
-MEASURED = ("flocsim", "benchmarks", "examples")
-"""Folders whose files decide what a benchmark prints."""
-
-
 def commit():
-    """The last commit that changed what is measured, "-dirty" where files differ from it."""
+    """The last commit that changed the package, "-dirty" where its files differ from that."""
 
     def git(*words):
-        command = ["git", "-C", str(ROOT), *words, "--", *MEASURED]
+        command = ["git", "-C", str(ROOT), *words, "--", "flocsim"]
         return subprocess.run(command, capture_output=True, text=True).stdout.strip()
 
     last = git("log", "-1", "--format=%h") or "unknown"

@@ -60,7 +60,7 @@ def make_cases(study, condition, count):
 
 
 def run_case(case, encounter, driver, limits):
-    """(outcome, end [s]) of a replicate, as Draw.run does it, but within a CPU time.
+    """(outcome, end [s], CPU time [s]) of a replicate from its start on.
 
     ``limits``: most simulated time [s] and most CPU time [s]; beyond them it is undecided.
     """
@@ -70,7 +70,8 @@ def run_case(case, encounter, driver, limits):
         if time.process_time() - began > limits[1]:
             status = Status.STEP_BUDGET
             break
-    return outcome_of(status, run.code, run.observed)[0], run.time
+    cpu = time.process_time() - began
+    return outcome_of(status, run.code, run.observed)[0], run.time, cpu
 
 
 def run_cases(cases, integrator, limits=None, allowed=None, exact=None):
@@ -78,15 +79,14 @@ def run_cases(cases, integrator, limits=None, allowed=None, exact=None):
     encounters = [case.with_integrator(integrator) for case in cases]
     driver = encounters[0].system.compose(observer=OBSERVER)
     run_case(cases[0], encounters[0], driver, (1e-12, math.inf))
-    found, began = [], time.process_time()
+    found = []
     for k, (case, encounter) in enumerate(zip(cases, encounters, strict=True)):
         most = NO_LIMITS if limits is None else limits[k]
         found.append(run_case(case, encounter, driver, most))
-        if allowed is not None and differing([outcome for outcome, _ in found], exact) > allowed:
+        if allowed is not None and differing([each[0] for each in found], exact) > allowed:
             return None
-    cpu = (time.process_time() - began) / len(cases)
-    outcomes, ends = (np.array(column) for column in zip(*found, strict=True))
-    return Result(outcomes, ends, cpu)
+    outcomes, ends, cpu = (np.array(column) for column in zip(*found, strict=True))
+    return Result(outcomes, ends, float(cpu.mean()))
 
 
 def differing(outcomes, exact):
