@@ -19,7 +19,7 @@ from benchmarks.speed.against_commit import other_tree
 SCRIPT = """
 import attrs
 import numpy as np
-from flocsim import Body, Sphere, SpheroPolygon, System, forces, integrators
+from flocsim import Body, Fluid, Sphere, SpheroPolygon, System, forces, integrators
 outline = SpheroPolygon(1e-5 * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]), 1e-6)
 shape = Sphere(5e-6) if {spheres} else outline
 bodies = [Body(shape, density=2650.0), Body(shape, (3e-6, 26e-6), density=2650.0)]
@@ -34,18 +34,19 @@ class Brush(forces.CentreForce):
 
 laws = [{forces}]
 method = integrators.{method}
-assert System(bodies, laws, method).run(until=1e-6).status.name == "FINISHED"
+system = System(bodies, laws, method, Fluid(buoyancy=True))
+assert system.run(until=1e-6).status.name == "FINISHED"
 """
 SWARM = """
 import numpy as np
-from flocsim import Body, SpheroPolygon, Swarm, forces
+from flocsim import Body, Fluid, SpheroPolygon, Swarm, forces
 outline = SpheroPolygon(1e-5 * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]), 1e-6)
 bodies = [Body(outline, (k * 2e-5, 0.0), density=2650.0) for k in range(4)]
 laws = [forces.Gravity(), forces.StokesDrag(), forces.Contact()]
-assert Swarm(bodies, laws).run(1e-4).status.name == "FINISHED"
+assert Swarm(bodies, laws, fluid=Fluid(buoyancy=True)).run(1e-4).status.name == "FINISHED"
 """
 
-METHODS = ("Implicit()", "Overdamped()", "DormandPrince54()", "VelocityVerlet(1e-8)")
+METHODS = ("Implicit()", "DormandPrince54()")
 FEW = ("Gravity()", "StokesDrag()", "Contact()")
 ALL = (*FEW, "VanDerWaals()", "DoubleLayer()")
 OTHERS = ("Gravity()", "Contact(friction=0.3)", "VanDerWaals(gap='surface')")
