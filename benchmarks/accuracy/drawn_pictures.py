@@ -20,8 +20,8 @@ from flocsim.io.images.reading import read_grey
 
 SOOT = "soot_tem/201805A_A6_004_half"
 FRAME = (600, 800)
-BLURS = (0.0, 1.0, 1.5, 2.0, 2.5, 3.0)
-NOISES = (0.0, 0.02, 0.04, 0.06, 0.1)
+BLURS = (0.0, 1.0, 2.0, 3.0)
+NOISES = (0.0, 0.04, 0.1)
 SMALLER = 3
 SIZES = ((2, 4), (4, 6), (6, 8), (8, 20))
 FALSE = 0.3
@@ -111,7 +111,7 @@ def blurred_table(masks):
     put = np.sqrt(np.bincount(fine.ravel())[1:] / np.pi) / SMALLER
     cover = (fine > 0).reshape(1000, SMALLER, 1000, SMALLER).mean(axis=(1, 3))
     for blur in BLURS:
-        for noise, vignette in ((0.0, 0.0), (0.02, 0.6), (0.05, 0.8)):
+        for noise, vignette in ((0.02, 0.6), (0.05, 0.8)):
             regions = segment(blurred_frame(cover, blur, noise, vignette)).regions
             known, found, low, high = np.array(compared(regions, labels, put)[0]).T
             for least, most in SIZES:

