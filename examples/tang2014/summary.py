@@ -37,7 +37,7 @@ def write_summary(folder, studies, changes, ways, readings, zones):
     """
     study, clay = studies["flocsim"], studies["clay"]
     fitted = {name: found for name, found in ways.items() if name != "clay"}
-    headline = {"tang2014": ways["flocsim"], "clay": ways["clay"]}
+    headline = {"clay": ways["clay"], "tang2014": ways["flocsim"]}
     parts = {
         "run": run_text(study),
         "times": times(folder),

@@ -64,8 +64,8 @@ def page_table(ways, numbers=None, quoted=True):
     for number, finding in columns[0].items():
         if (numbers is None or number in numbers) and finding.parts:
             index = deciding_part(finding)
-            others = len(finding.parts) - 1
-            more = f" (and {others} more)" if others else ""
+            others = len(finding.parts) - 1  # further parts of the claim
+            more = f" (+{others})" if others else ""
             cells = [part_text(found[number], index) for found in columns]
             claim = [SENTENCES[number], finding.claim] if quoted else [finding.claim]
             rows.append((number, *claim, finding.parts[index].what + more, *cells))
