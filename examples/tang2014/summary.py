@@ -50,7 +50,8 @@ def write_summary(folder, studies, changes, ways, readings, zones):
         "exceptions": exceptions(study, zones),
         "beside": beside_table(study),
     }
-    parts |= {f"in-full, {name}": claims_table(found) for name, found in ways.items()}
+    for number, found in enumerate(ways.values()):
+        parts["in-full" + "-again" * number] = claims_table(found)
     if readings:
         parts["readings"] = changed_verdicts({name: each for name, (_, each) in readings.items()})
         parts["reading-totals"] = readings_totals(readings)
