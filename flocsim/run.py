@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.compiler.composer import compose
-from flocsim.compiler.linker import apart, where
+from flocsim.compiler.linker import where
 from flocsim.forces.check import describe_sample
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.geometry.contact.candidates import rebuild_list
@@ -61,14 +61,6 @@ def extended(driver: Any, work: Work) -> tuple[Callable[..., int], Work]:
         work.tally.full = NOTHING_FULL
         return driver.whole, work
     return driver, with_room(work)
-
-
-@apart
-def clear(block: np.ndarray) -> None:
-    """Set an array of whole numbers, the memory of work arrays, to zero."""
-    # Apart, as other code knows this memory by other names, and must not read it before.
-    for word in range(block.shape[0]):
-        block[word] = 0
 
 
 class Run:

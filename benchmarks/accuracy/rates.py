@@ -20,6 +20,7 @@ import numpy as np
 from benchmarks.pictures import PICTURES, checked
 from benchmarks.reporting import EXAMPLES, Table, begin
 from flocsim.io.results.file import read_results
+from flocsim.process import WITHHELD
 
 CONFIGS = ("kernel.toml", "settling_kernel.toml", "settling_swarm.toml")
 
@@ -58,7 +59,9 @@ def python(folder, *words):
     print("$", *words, file=sys.stderr, flush=True)
     command = [sys.executable, *map(str, words)]
     done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, text=True)
-    # An incomplete study ends with another code; what it printed says so.
+    # An incomplete study has results, too, and says so in what it printed.
+    if done.returncode not in (0, WITHHELD):
+        done.check_returncode()
     return done.stdout
 
 
@@ -122,7 +125,6 @@ def main():
         flocsim(folder, "plot", "si-strength.h5")
         for source, target in FIGURES.items() if args.figures else ():
             shutil.copy(folder / source, Path(args.figures) / target)
-        print(*sorted(path.name for path in folder.glob("*.png")), file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -179,13 +179,13 @@ def main():
     compare([scene], [
         *adaptive(Implicit, cases[1:]), *adaptive(Implicit, cases, Swarm),
         *adaptive(DormandPrince54, cases[1:]),
-        *verlet(scene, [(1e6, 0.05)]), *by_step(*rates[:4]),
+        *verlet(scene, [(1e6, 0.05)]), *by_step(*rates),
     ], leaders, rigid_scenes.gas(12, 0.2))  # fmt: skip
     scene = rigid_scenes.pile(12, 3.0) if quick else rigid_scenes.pile(100, 4.0)
     cases = [(1e4, 1e-3)] if quick else [(1e4, 1e-3), (1e5, 1e-3)]
     compare([scene], [
         *adaptive(Implicit, cases), *verlet(scene, [(k, 0.05) for k, _ in cases]),
-        *by_step(*rates[:4]),
+        *by_step(*rates),
     ], leaders, rigid_scenes.pile(12, 1.5))  # fmt: skip
     leaders.print()
 

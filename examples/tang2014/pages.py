@@ -42,9 +42,7 @@ def write(folder, config, readings):
     ways = {"flocsim": check_claims(study, entries, read_touches(folder / "several.csv"))}
     if (folder / "study-paper.h5").exists():
         errors = library_of(folder, "errors-paper.h5")
-        ways["the paper's finder and fit"] = check_claims(
-            read_results(folder / "study-paper.h5"), errors
-        )
+        ways["paper"] = check_claims(read_results(folder / "study-paper.h5"), errors)
     clay = read_results(folder / "study-clay.h5")
     ways["clay"] = check_claims(clay)
     write_summary(folder, {"flocsim": study, "clay": clay}, changes, ways, held, zones_of(config))

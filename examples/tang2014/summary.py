@@ -18,6 +18,8 @@ from flocsim.io.terminal import markdown_table
 FLIP_KINDS = ("outcome", "aggregation", "zone")
 MOST_FLIPS, MOST_UNDECIDED = 0.5, 0.1
 """Goals [%]: outcome flips among the replicates run again, undecided among all."""
+HEADS = {"flocsim": "flocsim", "paper": "the paper's finder and fit"}
+"""Ways from picture to polygon: {name: head of their column}."""
 MOST_NAMED = 3
 """Flocs that are named of those whose pairs contradict a claim."""
 HEADLINES = (6, 8, 12, 13, 15, 16, 18, 19)
@@ -36,7 +38,7 @@ def write_summary(folder, studies, changes, ways, readings, zones):
     collisions)}; ``zones``: {type: D_0 [m]}.
     """
     study, clay = studies["flocsim"], studies["clay"]
-    fitted = {name: found for name, found in ways.items() if name != "clay"}
+    fitted = {HEADS[name]: found for name, found in ways.items() if name in HEADS}
     headline = {"clay": ways["clay"], "tang2014": ways["flocsim"]}
     parts = {
         "run": run_text(study),
@@ -50,8 +52,7 @@ def write_summary(folder, studies, changes, ways, readings, zones):
         "exceptions": exceptions(study, zones),
         "beside": beside_table(study),
     }
-    for number, found in enumerate(ways.values()):
-        parts["in-full" + "-again" * number] = claims_table(found)
+    parts |= {f"in-full-{name}": claims_table(found) for name, found in ways.items()}
     if readings:
         parts["readings"] = changed_verdicts({name: each for name, (_, each) in readings.items()})
         parts["reading-totals"] = readings_totals(readings)

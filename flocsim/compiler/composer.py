@@ -36,16 +36,16 @@ def compose(
     ``what`` it is in words, for who waits while it is compiled; "": nothing is said.
     Raises KernelError for kernels that capture variables or read globals that may change.
     """
+    # Cloned at once: what is reached later, compiled or not, is what it is now.
+    if not jit:
+        return Linker(fillings).link(entry)
+    refuse_no_compiler()
     # flocsim's own functions stay what they are in a process: scenes that differ in laws alone
     # need not be hashed again, which takes tens of milliseconds.
     key = entry, frozenset(fillings.items())
-    if jit and key in _composed:
+    if key in _composed:
         return _composed[key]
-    # Cloned at once: what is reached later, compiled or not, is what it is now.
     linked = Linker(fillings).link(entry)
-    if not jit:
-        return linked
-    refuse_no_compiler()
     name = f"flocsim_scene_{fingerprint(entry, fillings, options_text(), linked)}"
     engine = _composed.setdefault(name, Engine(linked, name, what))
     if all(str(each.__module__).startswith("flocsim.") for each in (entry, *fillings.values())):

@@ -10,8 +10,7 @@ import math
 
 import flocsim.swarms.arrays as sw
 from flocsim.geometry.contact.candidates import save_contacts
-from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
-from flocsim.run import clear
+from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance, clear
 from flocsim.state.bodies import VX, VY, X, Y
 from flocsim.state.clock import CANDIDATES_FULL
 from flocsim.state.contacts import OPEN

@@ -18,9 +18,9 @@ from flocsim.ensembles.collision.outcomes import BODY_I, BODY_J, OBSERVER
 from flocsim.ensembles.collision.start import Start, place_of
 from flocsim.ensembles.kind import ROW
 from flocsim.integrators.base import Integrator
-from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, PAUSED, STOPPED, advance
+from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, PAUSED, STOPPED, advance, clear
 from flocsim.integrators.rhs.error import outline_size
-from flocsim.run import STEPS_AT_A_TIME, UNABLE, clear, extended, force_to_blame, within_reach
+from flocsim.run import STEPS_AT_A_TIME, UNABLE, extended, force_to_blame, within_reach
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.clock import Clock, Counts
 from flocsim.state.declared import block_of

@@ -327,6 +327,14 @@ def advance(scene, work, observed, clock, counts, record):
     return FINISHED
 
 
+@apart
+def clear(block):
+    """Set an array of whole numbers, the memory of work arrays, to zero."""
+    # Apart, as other code knows this memory by other names, and must not read it before.
+    for word in range(block.shape[0]):
+        block[word] = 0
+
+
 def drive(scene, work, observed, clock, counts, record):
     """The same as an engine of its own, which shares its machine code with those that run many."""
     return advance(scene, work, observed, clock, counts, record)
