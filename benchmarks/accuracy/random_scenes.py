@@ -543,7 +543,8 @@ def main():
     Table("Random scenes", columns_, table).print()
     for scene, end, _ in found:
         if not end.is_right:
-            print(f"scene {scene.number} ({scene.family}): {end.status} after {end.steps} steps")
+            print(f"- scene {scene.number}, {scene.family}: {end.status} after {end.steps} steps")
+    print()
     if options.errors:
         print_errors(found)
 

@@ -107,7 +107,7 @@ def compare_memory(folder, counts):
 def main():
     """Print the tables."""
     only = {"nargs": "+", "default": ["ranks", "memory"]}
-    arguments = begin(__doc__, packages=("h5py", "mpi4py", "mpich"), only=only)
+    arguments = begin(__doc__, packages=("h5py", "mpi4py", "mpich"), used="two used", only=only)
     quick = arguments.quick
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -14,6 +14,11 @@ def words(*texts):
     return sum(len(text.split()) for text in texts)
 
 
+def words_and_numbers(text):
+    """Without the bars and dashes of tables."""
+    return sum(any(map(str.isalnum, word)) for word in text.split())
+
+
 def read(*patterns):
     return [path.read_text("utf-8") for each in patterns for path in ROOT.glob(each)]
 
@@ -22,6 +27,10 @@ def test_pages_for_users():
     pages = read("README.md", "docs/*.md", "docs/api/*.md")
     assert words(*pages) - words(*read(*FOR_DEVELOPERS, REPRODUCTION)) <= 20_000
     assert words(*read(REPRODUCTION)) <= 3_000
+
+
+def test_pages_of_evidence():
+    assert sum(map(words_and_numbers, read("docs/evidence/*.md"))) <= 12_000
 
 
 @pytest.mark.parametrize(("page", "most"), [("ARCHITECTURE.md", 2500), ("CONTRIBUTING.md", 1500)])
