@@ -1,15 +1,15 @@
 """A pilot of `--dry-run --pilot`: some replicates are timed, and their mean is scaled to the study.
 
-The replicates are run as the study runs them, second runs included, for some seconds of CPU time.
-Preparing two flocs that meet (outlines, start, compiled laws) is timed apart, because it is done
-once for all replicates that draw the same two. Nothing of the study is changed.
+The replicates are run as the study runs them, several of a condition one after another and second
+runs included, for some seconds of CPU time. Preparing two flocs that meet (outlines, start,
+compiled laws) is timed apart, because it is done once for all replicates that draw the same two.
+Nothing of the study is changed.
 """
 
 import math
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import islice
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -22,8 +22,11 @@ from flocsim.process import stop_requested
 SECONDS = 5.0
 """CPU time of the replicates [s]."""
 
-LEAST, MOST = 12, 900
-"""Replicates that are run at least, however long they take, and at most."""
+LEAST = 12
+"""Replicates that are run at least, however long they take."""
+
+AT_ONCE = 8
+"""Most replicates of a condition that are run before the next one takes its turn."""
 
 CLOCK = 0.1
 """Fraction by which the same work takes more or less time from one hour to the next."""
@@ -31,7 +34,7 @@ CLOCK = 0.1
 START = 0.8
 """CPU time [s] of a rank besides its replicates: reading, comparing with other ranks, writing."""
 
-EACH = 2.5e-4
+EACH = 5e-5
 """CPU time [s] of handing out, storing and counting a replicate (benchmarks.accuracy.dry_run)."""
 
 
@@ -63,17 +66,19 @@ def expected_replicates(config: Config) -> int:
     return min(config.replicates, max(wanted, config.stop.least))
 
 
-def sample_of(config: Config, places: Sequence[T]) -> Iterator[tuple[T, int]]:
+def sample_of(config: Config, places: Sequence[T], at_once: int = 1) -> Iterator[tuple[T, int]]:
     """Yield all (condition, replicate) in a random order in which the conditions take turns.
 
-    The first few are spread over the conditions as evenly as all.
+    The first few are spread over the conditions as evenly as all. ``at_once``: only every one in
+    so many, for others that follow it.
     """
     random = np.random.default_rng(config.seed)
     order = random.permutation(len(places)).tolist()
-    first = random.integers(config.replicates, size=len(places))
-    for turn in range(config.replicates):
+    starts = range(0, config.replicates, at_once)
+    first = random.integers(len(starts), size=len(places))
+    for turn in range(len(starts)):
         for each in order:
-            yield places[each], int(first[each] + turn) % config.replicates
+            yield places[each], starts[(first[each] + turn) % len(starts)]
 
 
 def pairs_made(study: Any, count: int, ranks: int) -> float:
@@ -97,21 +102,23 @@ def forecast_of(study: Any, ranks: int, seconds: float = SECONDS) -> Forecast:
     setups: list[float] = []
     ended: Counter[str] = Counter()
     began = time.process_time()
-    for condition, replicate in islice(sample_of(study.config, study.conditions), MOST):
+    for condition, first in sample_of(study.config, study.conditions, AT_ONCE):
         known, start = len(study.encounters), time.process_time()
-        if len(runs) >= LEAST and start - began > seconds:
+        if ended.total() >= LEAST and start - began > seconds:
             break
         name, vertices, delta = condition
         index = study.scene.names.index(name)
-        _ = study.draw(index, vertices, delta, replicate).encounter.scene
+        stop = min(first + min(AT_ONCE, study.at_a_time), study.config.replicates)
+        for replicate in range(first, stop):
+            _ = study.draw(index, vertices, delta, replicate).encounter.scene
         ready = time.process_time()
-        rows, _ = study.run_some(condition, replicate, replicate + 1, Overseer(stop_requested))
+        rows, _ = study.run_some(condition, first, stop, Overseer(stop_requested))
         if not len(rows):
             break
-        runs.append(time.process_time() - ready)
+        runs.append((time.process_time() - ready) / len(rows))
         if len(study.encounters) > known:
-            setups.append(ready - start)
-        ended[OUTCOMES[rows["outcome"][0]]] += 1
+            setups.append((ready - start) / (len(study.encounters) - known))
+        ended.update(OUTCOMES[each] for each in rows["outcome"])
     count = expected_replicates(study.config)
     size = count * len(study.conditions)
     mean = float(np.mean(runs or [0.0]))
