@@ -35,7 +35,7 @@ FORCES = {
     "both, thick": (PULL, THICK),
 }  # fmt: skip
 
-ZONES = {"tang2014": 5.925e-6, "clay": 1e-8}
+ZONES = {"tang2014": 5.925e-6, "clay": 1e-8, "si": 1e-8}
 """{preset: D_0 [m]}, which divides outcomes and moves with the law where it follows from it."""
 
 

@@ -118,8 +118,8 @@ class PairResistance(Force):
     uses a gap that changes from that of the outlines at contact to that of the spheres, which takes
     over between one and two mean radii. For real flocs at least 0.25 r_eq apart, with the drag of
     their shape, common motion is right to 3 % (rms), and that of settling pairs to 6 % (rms, 12 %
-    at most). Relative motion is right to 4 and 2 % (rms, along and across) at a gap of r_eq, 8 and
-    3 % at half of it, 22 and 5 % at a quarter (docs/evidence/accuracy.md).
+    at most). Relative motion is right to 6 and 2 % (rms, along and across) at a gap of r_eq, 18 and
+    5 % at half of it, 23 and 8 % at a quarter (docs/evidence/accuracy.md).
 
     For two free bodies with ratios of radii up to 50, and gaps from 1e-7 mean radii. Sources:
     Jeffrey and Onishi (1984), J. Fluid Mech. 139, 261; Jeffrey (1992), Phys. Fluids A 4, 16.
