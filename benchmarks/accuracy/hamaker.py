@@ -106,6 +106,7 @@ def draw(rows, varied, path, foot):
         handles.append(Line2D([], [], color="grey", label="or held apart", **hollow))
         place_legend(figure, {"forces by": handles}, spare)
         add_foot(figure, "Bars: 95 % sampling intervals.")
+        path.unlink(missing_ok=True)
         save(figure, path, foot=foot)
 
 
