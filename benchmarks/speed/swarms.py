@@ -167,7 +167,7 @@ def bulk_fraction(position, radii, width, low):
 
 def bed(arguments, table):
     """Bidisperse discs settle to a bed, and rest."""
-    for number in (100, 1000) if arguments.quick else (100, 1000, 10_000):
+    for number in (100,) if arguments.quick else (100, 1000):
         swarm = bed_of(number, 1e-8)
         until = 6.0 * math.sqrt(number / 100.0)
         spent, _, found = run(swarm, until, most=arguments.seconds)
@@ -216,14 +216,12 @@ def pile_of(number, friction, attraction, tolerance, seed=0):
 def pile(arguments, table):
     """Polygons settle on a floor and rest, by friction, with attraction and without."""
     few = 10 if arguments.quick else 50
-    cases = [(few, friction, 3.0) for friction in ("none", 0.0, 0.01, 0.4)]
-    cases += [] if arguments.quick else [(500, 0.4, 8.0)]
-    for number, friction, until in cases:
+    for friction in ("none", 0.0, 0.01, 0.4):
         for attraction in (True, False):
-            swarm = pile_of(number, friction, attraction, 1e-9)
-            spent, _, found = run(swarm, until, most=arguments.seconds)
+            swarm = pile_of(few, friction, attraction, 1e-9)
+            spent, _, found = run(swarm, 3.0, most=arguments.seconds)
             speed = float(np.hypot(*found.velocity[-1, 1:, :2].T).max())
-            table.add(number, friction, "with" if attraction else "without", float(found.t[-1]),
+            table.add(few, friction, "with" if attraction else "without", float(found.t[-1]),
                       spent, found.effort.steps, speed, found.status.name)  # fmt: skip
 
 
