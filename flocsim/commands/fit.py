@@ -210,8 +210,15 @@ def run(args: argparse.Namespace) -> int:
     }  # fmt: skip
     sizes = [PIXEL_SIZE.warning("the pixel size", picture.pixel_size) for picture in pictures]
     if doubts := list(dict.fromkeys(filter(None, sizes))):
+        report(f"warning: {'; '.join(doubts)}")
+    # Said of each picture as it was read; the library and flocsim study say it once more.
+    alarms = ((each.name, alarm) for each in pictures for alarm in each.found.alarms)
+    doubts += [f"check the outlines of {name}: {alarm}" for name, alarm in alarms]
+    read = {picture.path for picture in pictures}
+    if left := ", ".join(str(path) for path in paths if path not in read):
+        doubts.append(f"left out: {left}")
+    if doubts:
         settings["warning"] = "; ".join(doubts)
-        report(f"warning: {settings['warning']}")
     if args.finder == "paper":
         settings |= {"finder": "paper", "cutoff": args.cutoff or CUTOFF}
     if args.holes:
@@ -223,9 +230,7 @@ def run(args: argparse.Namespace) -> int:
     print("\n".join([format_errors(entries), *population_lines(entries)]))
     counts = ", ".join(map(str, args.vertices))
     flocs = plural(len(entries) // len(args.radii), "floc")
-    read = {picture.path for picture in pictures}
-    left = [str(path) for path in paths if path not in read]
-    end = f"; left out: {', '.join(left)}" if left else ""
+    end = f"; left out: {left}" if left else ""
     print(f"{args.output}: {flocs} at N = {counts}; {table}: all regions{end}")
 
     # A file may hold several pictures, which have names of their own.

@@ -32,6 +32,7 @@ from flocsim.io.images.review import checksum_of
 from flocsim.io.journal import Lock
 from flocsim.io.json_text import read_json
 from flocsim.io.seals import held, sha256_of
+from flocsim.io.shape_library import read_settings
 from flocsim.process import INTERRUPTED, SIGNALS, STOPPED, WITHHELD, deferred, handle
 
 KINDS = {"clay": "clay", "tang2014": "paper", "si": "measured"}
@@ -174,6 +175,8 @@ def make_study(args: Namespace) -> int:
             kind, file = open_kind(path)
             found = kind.read(file)
             print("", kind.setting(found), kind.answer(found), sep="\n")
+        if doubt := read_settings(folder.path / "shapes.h5").get("warning"):
+            print(f"\nwarning: {doubt}")
         print(f"\nall on one page: {folder.path / REPORT}")
         review = folder.path / "shapes-review.html"
         print(f"choose flocs by eye on {review}; then add --reviewed FILE --overwrite")

@@ -51,7 +51,7 @@ def unfinished(path: str | os.PathLike, rule: Rule = False) -> Iterator[BinaryIO
     """
     target = ordinary_target(path)
     if target.exists() and is_kept(target, rule):
-        raise FileError(f"{path} already exists and is left as it is: name another place")
+        raise FileError(f"{path} already exists and is left as it is: name another or overwrite it")
     try:
         temporary = fresh_beside(target)
         try:

@@ -43,12 +43,14 @@ def steps(text):
 
 
 def test_study_ends_with_an_answer(picture, capfd):
-    assert study() == 0
+    (picture / "notes.png").write_text("no picture")
+    assert main(["study", "notes.png", *WORDS, *FEW]) == 0
     told = capfd.readouterr().out
     assert steps(told) == ["fit", "init", "ensemble", "plot", "report"]
-    *_, setting, answer, _, page, review, _ = told.split("\n")
+    *_, setting, answer, _, doubt, _, page, review, _ = told.split("\n")
     assert setting.startswith("Preset clay: real weight, water of 15 °C and 35 g/kg of salt, ")
     assert answer.startswith("Of pairs of spheres that touch, 100 % [")
+    assert doubt == "warning: left out: notes.png"
     assert page == "all on one page: mine/report.html"
     assert review.startswith("choose flocs by eye on mine/shapes-review.html; then add --reviewed")
     assert (picture / "mine/report.html").exists()
