@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -71,8 +72,9 @@ class Survey:
 
     @property
     def results(self) -> Any:
-        """The opened results, once for each process; a forked one inherits them."""
-        return opened(self.path, self.allowed.folder, tuple(self.allowed.own))
+        """The opened results, once for each process: two that share an open file by a fork move
+        the place at which the other reads."""
+        return opened(self.path, self.allowed.folder, tuple(self.allowed.own), os.getpid())
 
     def test(self, doublet: Bound) -> Opening:
         """Run a doublet again until it is bound, and then in flows of rising rate."""
@@ -98,8 +100,8 @@ class Survey:
 
 
 @cache
-def opened(path: Path, folder: Path | None, own: tuple[str, ...]) -> Any:
-    """Open results whose bonds can be tested."""
+def opened(path: Path, folder: Path | None, own: tuple[str, ...], process: int) -> Any:
+    """Open results whose bonds can be tested, for the process of this number."""
     results = StudyResults(path, Allowed(folder, own))
     refuse_outlines(results.config.forces, "the strength of a bond")
     return results

@@ -51,6 +51,21 @@ class FakeResults:
         return {"seed": self.seed}
 
 
+def test_every_process_opens_the_results_itself(monkeypatch):
+    """A forked one that used the open file of the first would move its place in it."""
+    monkeypatch.setattr(
+        module,
+        "StudyResults",
+        lambda path, allowed: SimpleNamespace(path=path, config=SimpleNamespace(forces=())),
+    )
+    monkeypatch.setattr(module, "refuse_outlines", lambda forces, what: None)
+    survey = Survey("opened by two.h5")
+    first = survey.results
+    assert survey.results is first
+    monkeypatch.setattr(module.os, "getpid", lambda: 0)
+    assert survey.results is not first
+
+
 def opening_of(start):
     """What is found of a doublet: it opens at 100/s times one more than its replicate."""
     rate = 100.0 * (1 + start[0])
