@@ -15,7 +15,7 @@ def words(*texts):
 
 
 def words_and_numbers(text):
-    """Without the bars and dashes of tables."""
+    """Return how many there are, without the bars and dashes of tables."""
     return sum(any(map(str.isalnum, word)) for word in text.split())
 
 

@@ -69,8 +69,8 @@ def expected_replicates(config: Config) -> int:
 def sample_of(config: Config, places: Sequence[T], at_once: int = 1) -> Iterator[tuple[T, int]]:
     """Yield all (condition, replicate) in a random order in which the conditions take turns.
 
-    The first few are spread over the conditions as evenly as all. ``at_once``: only every one in
-    so many, for others that follow it.
+    The first few are spread over the conditions as evenly as all. ``at_once``: size of the groups
+    of consecutive replicates of a condition, of which only the first one is given.
     """
     random = np.random.default_rng(config.seed)
     order = random.permutation(len(places)).tolist()
@@ -112,6 +112,7 @@ def forecast_of(study: Any, ranks: int, seconds: float = SECONDS) -> Forecast:
         for replicate in range(first, stop):
             _ = study.draw(index, vertices, delta, replicate).encounter.scene
         ready = time.process_time()
+        # A group shares the cost of entering compiled code, as the batches of a study do.
         rows, _ = study.run_some(condition, first, stop, Overseer(stop_requested))
         if not len(rows):
             break

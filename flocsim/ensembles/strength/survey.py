@@ -72,8 +72,8 @@ class Survey:
 
     @property
     def results(self) -> Any:
-        """The opened results, once for each process: two that share an open file by a fork move
-        the place at which the other reads."""
+        """The results, opened by each process for itself: after a fork two processes share the
+        position in a file that was open before, and either would read where the other one is."""
         return opened(self.path, self.allowed.folder, tuple(self.allowed.own), os.getpid())
 
     def test(self, doublet: Bound) -> Opening:
@@ -101,7 +101,7 @@ class Survey:
 
 @cache
 def opened(path: Path, folder: Path | None, own: tuple[str, ...], process: int) -> Any:
-    """Open results whose bonds can be tested, for the process of this number."""
+    """Return opened results whose bonds can be tested; ``process``: number of the reader."""
     results = StudyResults(path, Allowed(folder, own))
     refuse_outlines(results.config.forces, "the strength of a bond")
     return results

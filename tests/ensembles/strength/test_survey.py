@@ -52,7 +52,7 @@ class FakeResults:
 
 
 def test_every_process_opens_the_results_itself(monkeypatch):
-    """A forked one that used the open file of the first would move its place in it."""
+    """After a fork two processes share the position in a file that was open before."""
     monkeypatch.setattr(
         module,
         "StudyResults",
